@@ -1,0 +1,311 @@
+"""The mesher of a box in layered ground: a grid of lines, graded away from the box, with joints all round the box.
+
+Node coordinates away from the box are a prefix of one sequence per direction: a larger domain keeps the mesh of a smaller one,
+only the outermost column or row may be cut (D12). Diagonals are mirrored about the box's axis.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import ceil, exp, log
+
+import numpy as np
+
+from .mesh import Floats, Ints, Mesh
+from .spec import Box, Layer, MeshOptions, Spec
+
+SLIVER = 0.25
+"""An outermost column or row thinner than this part of the regular size is joined to its neighbour."""
+
+
+@dataclass(frozen=True)
+class Grading:
+    """Element size at distance d from the box: min(first + (growth - 1) d, largest), so neighbours grow by `growth`."""
+
+    first: float
+    growth: float
+    largest: float
+
+    def size(self, d: float) -> float:
+        """Element size at distance d."""
+        return min(self.first + (self.growth - 1) * d, self.largest)
+
+    def _knee(self) -> float:
+        """Distance from which the size is `largest`."""
+        if self.first >= self.largest:
+            return 0.0
+        return (self.largest - self.first) / (self.growth - 1) if self.growth > 1 else np.inf
+
+    def count(self, d: float) -> float:
+        """Number of elements from the box to distance d, the integral of 1/size."""
+        near = min(d, self._knee())
+        slope = self.growth - 1
+        graded = _log_ratio(slope, near, self.first)
+        return graded + (d - near) / self.largest
+
+    def distance(self, count: float) -> float:
+        """Inverse of `count`."""
+        knee = self._knee()
+        at_knee = self.count(knee) if np.isfinite(knee) else np.inf
+        if count > at_knee:
+            return knee + (count - at_knee) * self.largest
+        slope = self.growth - 1
+        return count * self.first if slope == 0 else self.first * (exp(slope * count) - 1) / slope
+
+    def between(self, start: float, end: float) -> list[float]:
+        """Lines after `start` up to `end`, both of which are lines: as many as keep every size within the grading."""
+        begin, total = self.count(start), self.count(end) - self.count(start)
+        n = max(1, ceil(total - 1e-6))
+        return [self.distance(begin + total * i / n) for i in range(1, n)] + [end]
+
+    def outwards(self, start: float, end: float) -> list[float]:
+        """Lines after `start`, each a size from the last, until `end` cuts the sequence."""
+        lines = [start]
+        while lines[-1] + self.size(lines[-1]) < end * (1 - 1e-9):
+            lines.append(lines[-1] + self.size(lines[-1]))
+        if len(lines) > 1 and end - lines[-1] < SLIVER * self.size(lines[-1]):
+            lines.pop()
+        return [*lines[1:], end]
+
+
+def _log_ratio(slope: float, d: float, first: float) -> float:
+    """∫ dx/(first + slope x) from 0 to d."""
+    return d / first if slope == 0 else log(1 + slope * d / first) / slope
+
+
+@dataclass(frozen=True)
+class BoxMesh:
+    """The mesh with what the joints lie against: (layer, element length) of every joint material."""
+
+    mesh: Mesh
+    joint_groups: tuple[tuple[int, float], ...]
+
+
+def box_mesh(spec: Spec) -> BoxMesh:
+    """Mesh of the model in metres. Materials: one a layer, the structure last."""
+    grid = _grid(spec)
+    cells = _cells(grid, spec)
+    ground, structure = (_split(grid, cells, cells.kind == kind, kind * grid.n_node) for kind in (0, 1))
+    triangles = np.concatenate([ground, structure])
+    outline = _outline(grid)
+    material = np.repeat(np.concatenate([cells.layer[cells.kind == 0], cells.layer[cells.kind == 1]]), 2)
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    new = np.full(2 * grid.n_node, -1)
+    new[used] = np.arange(len(used))
+    touching = (new[outline] >= 0).all(axis=1) & (cells.outside >= 0)
+    joints = np.column_stack([outline, outline[:, ::-1] + grid.n_node])[touching]
+    nodes = np.column_stack([np.tile(grid.x, len(grid.y)), np.repeat(grid.y, len(grid.x))])
+    joint_nodes = new[joints]
+    groups, joint_material = _joint_groups(nodes[joints[:, 0]], nodes[joints[:, 1]], cells.outside[touching], spec)
+    mesh = Mesh(
+        nodes=nodes[used % grid.n_node],
+        triangles=renumbered.reshape(-1, 3),
+        material=material,
+        joints=joint_nodes,
+        joint_material=joint_material,
+        pressure_edges=new[outline + grid.n_node],
+        boundaries={name: new[ids][new[ids] >= 0] for name, ids in _boundaries(grid).items()},
+        corners=new[grid.corners() + grid.n_node],
+        structure=material == len(spec.layer),
+    )
+    return BoxMesh(_with_named_points(mesh, spec), groups)
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Lines of the grid, left to right and base to surface, with the box's first and last line in both directions."""
+
+    x: Floats
+    y: Floats
+    columns: tuple[int, int]
+    rows: tuple[int, int]
+
+    @property
+    def n_node(self) -> int:
+        return len(self.x) * len(self.y)
+
+    def node(self, column: Ints | int, row: Ints | int) -> Ints:
+        return np.asarray(row) * len(self.x) + np.asarray(column)
+
+    def corners(self) -> Ints:
+        (left, right), (low, high) = self.columns, self.rows
+        return self.node(np.array([left, right, right, left]), np.array([high, high, low, low]))
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """Cells of the grid, row by row: lower left node, layer (the structure counts after them), kind 0 ground, 1 structure, 2 void.
+
+    outside : layer on the other side of each edge of the outline, -1 where there is no ground
+    """
+
+    origin: Ints
+    layer: Ints
+    kind: Ints
+    right_of_axis: Ints
+    outside: Ints
+
+
+def _grid(spec: Spec) -> _Grid:
+    box, options = spec.box, spec.mesh
+    across = Grading(options.first, options.growth, options.largest_width)
+    half = _half_width_lines(box, options)
+    sides = [across.outwards(0.0, spec.domain.width / 2 + sign * box.offset - box.width / 2) for sign in (1, -1)]
+    left, right = (box.width / 2 + np.array(side) for side in sides)
+    from_axis = np.concatenate([-left[::-1], -half[:0:-1], half, right])
+    x = box.offset + from_axis
+    x[0], x[-1] = -spec.domain.width / 2, spec.domain.width / 2
+    depths, first, last = _depth_lines(spec)
+    n = len(depths) - 1
+    return _Grid(x, -depths[::-1], (len(left), len(left) + 2 * len(half) - 2), (n - last, n - first))
+
+
+def _half_width_lines(box: Box, options: MeshOptions) -> Floats:
+    """Lines from the axis to the outer face of a wall."""
+    clear = np.linspace(0.0, box.width / 2 - box.wall, options.roof_elements // 2 + 1)
+    wall = np.linspace(box.width / 2 - box.wall, box.width / 2, options.wall_elements + 1)
+    return np.concatenate([clear, wall[1:]])
+
+
+def _depth_lines(spec: Spec) -> tuple[Floats, int, int]:
+    """All lines by depth, with the positions of the box's roof and floor among them."""
+    box, options = spec.box, spec.mesh
+    upright = Grading(options.first, options.growth, options.largest_height)
+    roof, floor = box.depth, box.depth + box.height
+    bounds = [layer.bottom for layer in spec.layer[:-1] if layer.bottom < spec.domain.depth]
+    above = _breaks([0.0, roof], bounds)
+    inside = _breaks([roof, roof + box.wall, roof + box.height / 2, floor - box.wall, floor], bounds)
+    below = _breaks([floor, spec.domain.depth], bounds)
+    upper = [0.0] + [d for a, b in pairwise(sorted(roof - z for z in above)) for d in upright.between(a, b)]
+    lower = [d for a, b in pairwise(z - floor for z in below[:-1]) for d in upright.between(a, b)]
+    lower += upright.outwards(below[-2] - floor, below[-1] - floor)
+    middle = [z for a, b in pairwise(inside) for z in np.linspace(a, b, 1 + _box_elements(a, b, box, options))[1:]]
+    lines = [roof - d for d in reversed(upper)] + middle + [floor + d for d in lower]
+    depths = np.array(lines)
+    depths[0], depths[-1] = 0.0, spec.domain.depth
+    return depths, len(upper) - 1, len(upper) - 1 + len(middle)
+
+
+def _box_elements(top: float, bottom: float, box: Box, options: MeshOptions) -> int:
+    """Elements between two fixed lines of the box's height."""
+    middle = (top + bottom) / 2 - box.depth
+    in_slab = middle < box.wall or middle > box.height - box.wall
+    size = box.wall / options.wall_elements if in_slab else (box.height - 2 * box.wall) / options.side_elements
+    return max(1, round((bottom - top) / size))
+
+
+def _breaks(fixed: list[float], bounds: list[float]) -> list[float]:
+    """Fixed lines and the layer boundaries between the first and the last of them; those that coincide count once."""
+    near = 1e-9 * max(fixed)
+    inner = [z for z in bounds if fixed[0] < z < fixed[-1] and all(abs(z - line) > near for line in fixed)]
+    return sorted({*fixed, *inner})
+
+
+def _cells(grid: _Grid, spec: Spec) -> _Cells:
+    columns, rows = len(grid.x) - 1, len(grid.y) - 1
+    row, column = (axis.ravel() for axis in np.mgrid[:rows, :columns])
+    depth = -(grid.y[:-1] + grid.y[1:]) / 2
+    layer_of_row = layer_at(depth, spec.layer)
+    (left, right), (low, high) = grid.columns, grid.rows
+    in_box = (left <= column) & (column < right) & (low <= row) & (row < high)
+    middle = (grid.x[column] + grid.x[column + 1]) / 2 - spec.box.offset
+    height = depth[row] - spec.box.depth
+    hollow = (np.abs(middle) < spec.box.width / 2 - spec.box.wall) & (height > spec.box.wall)
+    hollow &= height < spec.box.height - spec.box.wall
+    kind = np.where(in_box, np.where(hollow, 2, 1), 0)
+    outside_rows = np.concatenate(
+        [np.full(right - left, low - 1), np.arange(low, high), np.full(right - left, high), np.arange(low, high)[::-1]]
+    )
+    covered = outside_rows < rows
+    outside = np.where(covered, layer_of_row[np.minimum(outside_rows, rows - 1)], -1)
+    layer = np.where(kind == 0, layer_of_row[row], len(spec.layer))
+    return _Cells(grid.node(column, row), layer, kind, middle > 0, outside)
+
+
+def layer_at(depth: Floats, layers: tuple[Layer, ...]) -> Ints:
+    """Index of the layer at each depth; the last layer goes on below its bottom."""
+    bottoms = np.array([layer.bottom for layer in layers[:-1]])
+    return np.searchsorted(bottoms, depth)
+
+
+def _split(grid: _Grid, cells: _Cells, chosen: Ints, shift: int) -> Ints:
+    """Two triangles for each chosen cell, diagonals mirrored about the box's axis; node numbers moved by `shift`."""
+    sw = cells.origin[chosen] + shift
+    se, nw = sw + 1, sw + len(grid.x)
+    ne = nw + 1
+    right = cells.right_of_axis[chosen][:, None, None]
+    rising = np.stack([np.column_stack([sw, se, ne]), np.column_stack([sw, ne, nw])], axis=1)
+    falling = np.stack([np.column_stack([sw, se, nw]), np.column_stack([se, ne, nw])], axis=1)
+    return np.where(right, falling, rising).reshape(-1, 3)
+
+
+def _outline(grid: _Grid) -> Ints:
+    """Edges of the box's outer face, counter-clockwise from the lower left corner: the box lies to their left."""
+    (left, right), (low, high) = grid.columns, grid.rows
+    across, upwards = np.arange(left, right + 1), np.arange(low, high + 1)
+    sides = [
+        grid.node(across, low),
+        grid.node(right, upwards),
+        grid.node(across[::-1], high),
+        grid.node(left, upwards[::-1]),
+    ]
+    return np.concatenate([np.column_stack([side[:-1], side[1:]]) for side in sides])
+
+
+def _boundaries(grid: _Grid) -> dict[str, Ints]:
+    columns, rows = np.arange(len(grid.x)), np.arange(len(grid.y))
+    return {
+        "base": grid.node(columns, 0),
+        "left": grid.node(0, rows),
+        "right": grid.node(len(grid.x) - 1, rows),
+        "surface": grid.node(columns, len(grid.y) - 1),
+    }
+
+
+def _joint_groups(first: Floats, second: Floats, layer: Ints, spec: Spec) -> tuple[tuple[tuple[int, float], ...], Ints]:
+    """Joint materials: a layer each, or a layer and element length each where the thickness depends on the length."""
+    lengths = np.linalg.norm(second - first, axis=1)
+    keys = [(int(i), float(round(h, 9)) if spec.joint.thickness_ratio else 0.0) for i, h in zip(layer, lengths, strict=True)]
+    groups = tuple(sorted(set(keys)))
+    return groups, np.array([groups.index(key) for key in keys], dtype=np.int64)
+
+
+def _with_named_points(mesh: Mesh, spec: Spec) -> Mesh:
+    """A…D on the box's outer faces, S and F on the surface, and the points the user asked for."""
+    box, right = spec.box, spec.domain.width / 2
+    middle = -box.depth - box.height / 2
+    faces = {
+        "A": (box.offset, -box.depth),
+        "B": (box.offset + box.width / 2, middle),
+        "C": (box.offset - box.width / 2, middle),
+        "D": (box.offset, -box.depth - box.height),
+    }
+    in_structure = np.isin(np.arange(len(mesh.nodes)), mesh.triangles[mesh.structure])
+    in_ground = np.isin(np.arange(len(mesh.nodes)), mesh.triangles[~mesh.structure])
+    probes = {name: mesh.probe_on(_nearest(mesh, place, in_structure), mesh.structure) for name, place in faces.items()}
+    above_box = in_ground if box.depth > 0 else in_structure
+    probes["S"] = mesh.probe_on(_nearest(mesh, (box.offset, 0.0), above_box))
+    probes["F"] = mesh.probe_on(_nearest(mesh, (right, 0.0), in_ground))
+    with_names = replace(mesh, probes=probes)
+    for name, (x, y) in spec.output.points.items():
+        with_names = with_names.with_probe(name, x, y)
+    return with_names
+
+
+def _nearest(mesh: Mesh, place: tuple[float, float], among: Ints) -> int:
+    candidates = np.flatnonzero(among)
+    return int(candidates[np.argmin(((mesh.nodes[candidates] - place) ** 2).sum(axis=1))])
+
+
+def column_mesh(y: Floats, layers: tuple[Layer, ...]) -> Mesh:
+    """One column of the layered ground on the lines y (from the base up), 1 m wide: the free field when its sides are tied."""
+    rows = np.arange(len(y))
+    nodes = np.column_stack([np.tile([0.0, 1.0], len(y)), np.repeat(y, 2)])
+    sw = 2 * rows[:-1]
+    triangles = np.stack([np.column_stack([sw, sw + 1, sw + 3]), np.column_stack([sw, sw + 3, sw + 2])], axis=1)
+    mesh = Mesh(
+        nodes=nodes,
+        triangles=triangles.reshape(-1, 3),
+        material=np.repeat(layer_at(-(y[:-1] + y[1:]) / 2, layers), 2),
+        boundaries={"base": np.array([0, 1]), "left": 2 * rows, "right": 2 * rows + 1},
+    )
+    return mesh

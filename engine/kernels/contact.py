@@ -1,0 +1,253 @@
+"""The condensed joint solve of one lane (D9): g + G lambda(g) = g_free with the law of `joint` at every point.
+
+Unknowns are the forces of closed points, which keeps the system well conditioned however stiff the joint: a closed point adds
+1/k to the diagonal. The states of the last step are tried first with the factor kept from then; where they do not hold, block
+Gauss-Seidel sweeps propose states and a direct solve follows, until proposed and found states agree.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .dense import factorise, solve
+from .jit import kernel
+from .joint import OPEN, STICK, balance, slip_sign
+
+EQUATION_TOLERANCE = 1e-12  # of D9
+STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep the state they have
+PROJECTED_ROUNDS = 8  # rounds that restart the sweeps from the direct solution; later ones continue the sweeps alone
+
+
+class Law(NamedTuple):
+    """Joint parameters of every lane, (LANES, n_point): stiffness times tributary area [N/m] and friction [1]."""
+
+    k_n: np.ndarray
+    k_s: np.ndarray
+    mu: np.ndarray
+
+
+class Workspace(NamedTuple):
+    """Scratch of the solve, and the factor kept for each lane with the states it belongs to."""
+
+    lu: np.ndarray  # (LANES, m, m)
+    pivot: np.ndarray  # (LANES, m)
+    factored: np.ndarray  # (LANES, n_point), -1 where there is none
+    unknown: np.ndarray  # (m,)
+    product: np.ndarray  # (m,) G lambda
+    swept: np.ndarray  # (m,) forces of the sweeps
+    free: np.ndarray  # (m,) g_free of the lane at work
+    proposal: np.ndarray  # (n_point,)
+
+
+def workspace(n_point: int, lanes: int) -> Workspace:
+    """An empty workspace for `n_point` joint points."""
+    m = 2 * n_point
+    return Workspace(
+        np.zeros((lanes, m, m)),
+        np.zeros((lanes, m), dtype=np.int64),
+        np.full((lanes, n_point), -1, dtype=np.int8),
+        np.zeros(m),
+        np.zeros(m),
+        np.zeros(m),
+        np.zeros(m),
+        np.zeros(n_point, dtype=np.int8),
+    )
+
+
+@kernel
+def _assemble(G, k_n, k_s, mu, state, A):
+    """Fill A with the equations of the closed points in these states; the number of unknowns is returned."""
+    row = 0
+    for p in range(state.shape[0]):
+        for direction in range(1 if state[p] != STICK else 2):
+            if state[p] == OPEN:
+                continue
+            i, column = 2 * p + direction, 0
+            for q in range(state.shape[0]):
+                if state[q] == OPEN:
+                    continue
+                if state[q] == STICK:
+                    A[row, column] = G[i, 2 * q]
+                    A[row, column + 1] = G[i, 2 * q + 1]
+                    column += 2
+                else:
+                    A[row, column] = G[i, 2 * q] - slip_sign(state[q]) * mu[q] * G[i, 2 * q + 1]
+                    column += 1
+            A[row, row] += 1.0 / (k_n[p] if direction == 0 else k_s[p])
+            row += 1
+    return row
+
+
+@kernel
+def _residual(G, g_free, g, lam, product):
+    """Relative residual of g + G lambda = g_free; `product` receives G lambda. 0/0 at rest counts as solved."""
+    worst = free = scale = 0.0
+    for i in range(g.shape[0]):
+        total = 0.0
+        for j in range(g.shape[0]):
+            total += G[i, j] * lam[j]
+        product[i] = total
+        worst += (g[i] - g_free[i] + total) ** 2
+        free += g_free[i] ** 2
+        scale += total**2
+    scale = max(free, scale)
+    return 0.0 if scale == 0.0 else np.sqrt(worst / scale)
+
+
+@kernel
+def _scatter(x, k_n, k_s, mu, slip, state, g, lam, add):
+    """Forces of the unknowns x into lam, and the gaps they imply into g; `add` corrects instead of setting them."""
+    k = 0
+    for p in range(state.shape[0]):
+        n, s = 2 * p, 2 * p + 1
+        old_n = lam[n] if add else 0.0
+        old_s = lam[s] if add else 0.0
+        if state[p] == OPEN:
+            lam[n] = lam[s] = 0.0
+            continue
+        lam[n] = old_n + x[k]
+        g[n] = lam[n] / k_n[p]
+        if state[p] == STICK:
+            lam[s] = old_s + x[k + 1]
+            g[s] = slip[p] + lam[s] / k_s[p]
+            k += 2
+        else:
+            lam[s] = -slip_sign(state[p]) * mu[p] * lam[n]
+            k += 1
+
+
+@kernel
+def _free_gaps(g_free, product, state, g):
+    """Gaps that follow from the forces: both of open points, the tangential one of sliding points."""
+    for p in range(state.shape[0]):
+        if state[p] == OPEN:
+            g[2 * p] = g_free[2 * p] - product[2 * p]
+        if state[p] != STICK:
+            g[2 * p + 1] = g_free[2 * p + 1] - product[2 * p + 1]
+
+
+@kernel
+def _rows(state, source, slip, x):
+    """Entries of `source` that belong to the unknowns, less the slip of sticking points."""
+    k = 0
+    for p in range(state.shape[0]):
+        if state[p] == OPEN:
+            continue
+        x[k] = source[2 * p]
+        k += 1
+        if state[p] == STICK:
+            x[k] = source[2 * p + 1] - slip[p]
+            k += 1
+
+
+@kernel
+def _direct(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, unknown, product):
+    """Solve for given states. The factor is reused while they last. Returns the relative residual, infinity where singular."""
+    n_point = state.shape[0]
+    same, size = True, 0
+    for p in range(n_point):
+        same = same and factored[p] == state[p]
+        size += 0 if state[p] == OPEN else (2 if state[p] == STICK else 1)
+    if not same:
+        _assemble(G, k_n, k_s, mu, state, lu)
+        factored[:] = state
+        if not factorise(lu, size, pivot):
+            factored[:] = -1
+            return np.inf
+    _rows(state, g_free, slip, unknown)
+    solve(lu, size, pivot, unknown)
+    _scatter(unknown, k_n, k_s, mu, slip, state, g, lam, False)
+    _residual(G, g_free, g, lam, product)
+    _free_gaps(g_free, product, state, g)
+    residual = _residual(G, g_free, g, lam, product)
+    if residual > 0.1 * EQUATION_TOLERANCE:  # one step of iterative refinement
+        for i in range(g.shape[0]):
+            product[i] = g_free[i] - product[i] - g[i]
+        _rows(state, product, np.zeros(n_point), unknown)
+        solve(lu, size, pivot, unknown)
+        _scatter(unknown, k_n, k_s, mu, slip, state, g, lam, True)
+        _residual(G, g_free, g, lam, product)
+        _free_gaps(g_free, product, state, g)
+        residual = _residual(G, g_free, g, lam, product)
+    return residual
+
+
+@kernel
+def _holds(state, g, lam, slip, k_s, mu, g_scale, lam_scale):
+    """Whether every point may stay in its state: no tension, no penetration of open points, the Coulomb limit, slip forward."""
+    g_tol, lam_tol = STATE_TOLERANCE * g_scale, STATE_TOLERANCE * lam_scale
+    for p in range(state.shape[0]):
+        n, s = 2 * p, 2 * p + 1
+        if state[p] == OPEN:
+            if g[n] < -g_tol:
+                return False
+        elif lam[n] > lam_tol:
+            return False
+        elif state[p] == STICK:
+            if abs(lam[s]) > -mu[p] * lam[n] + lam_tol:
+                return False
+        elif mu[p] > 0.0 and slip_sign(state[p]) * (g[s] - lam[s] / k_s[p] - slip[p]) < -g_tol:
+            return False
+    return True
+
+
+@kernel
+def _project(state, lam, mu):
+    """Bring forces back onto the law's cone before sweeps restart from them."""
+    for p in range(state.shape[0]):
+        n, s = 2 * p, 2 * p + 1
+        lam[n] = min(lam[n], 0.0)
+        limit = -mu[p] * lam[n]
+        lam[s] = max(-limit, min(limit, lam[s]))
+
+
+@kernel
+def _sweep(G, g_free, k_n, k_s, mu, slip, lam, proposal):
+    """One block Gauss-Seidel sweep over the points: lam and the proposed states are updated in place."""
+    for p in range(proposal.shape[0]):
+        n, s = 2 * p, 2 * p + 1
+        r_n, r_s = g_free[n], g_free[s]
+        for j in range(lam.shape[0]):
+            r_n -= G[n, j] * lam[j]
+            r_s -= G[s, j] * lam[j]
+        r_n += G[n, n] * lam[n] + G[n, s] * lam[s]
+        r_s += G[s, n] * lam[n] + G[s, s] * lam[s]
+        code, lam[n], lam[s] = balance(G[n, n], G[n, s], G[s, s], r_n, r_s, slip[p], k_n[p], k_s[p], mu[p])
+        proposal[p] = np.int8(code)
+
+
+@kernel
+def _largest(x):
+    largest = 0.0
+    for i in range(x.shape[0]):
+        largest = max(largest, abs(x[i]))
+    return largest
+
+
+@kernel
+def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
+    """Find gaps g (m,), forces lam (m,) and states (n_point,) of one lane; all three come in as those of the last step.
+
+    Returns (rounds, residual): how many direct solves it took, -1 where `max_rounds` did not do, and the relative residual.
+    """
+    k_n, k_s, mu = law.k_n[lane], law.k_s[lane], law.mu[lane]
+    lu, pivot, factored = work.lu[lane], work.pivot[lane], work.factored[lane]
+    g_scale = _largest(g_free)
+    if not np.isfinite(g_scale):
+        return -1, np.inf
+    work.swept[:] = lam
+    work.proposal[:] = state
+    residual = np.inf
+    for attempt in range(max_rounds):
+        residual = _direct(
+            G, g_free, k_n, k_s, mu, slip, work.proposal, g, lam, lu, pivot, factored, work.unknown, work.product
+        )
+        if residual <= EQUATION_TOLERANCE and _holds(work.proposal, g, lam, slip, k_s, mu, g_scale, _largest(lam)):
+            state[:] = work.proposal
+            return attempt + 1, residual
+        if 0 < attempt <= PROJECTED_ROUNDS and residual < np.inf:
+            _project(work.proposal, lam, mu)
+            work.swept[:] = lam
+        for _ in range(3 if attempt <= PROJECTED_ROUNDS else 3 * (attempt - PROJECTED_ROUNDS)):
+            _sweep(G, g_free, k_n, k_s, mu, slip, work.swept, work.proposal)
+    return -1, residual

@@ -1,0 +1,64 @@
+"""The one numba policy: how every kernel is compiled, how many lanes it serves, and where its machine code is kept."""
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+
+LANES = 16
+"""Cases that march together. Every lane array is (rows, LANES) with the lane contiguous; short batches are padded."""
+
+FLAGS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+"""`contract` lets a product and a sum become one fused operation, the same one in every lane; nothing is reassociated and
+NaN and infinity keep their meaning."""
+
+
+def _key() -> str:
+    """Digest of all that decides the machine code, which numba's own stamp (the file's time) does not see."""
+    digest = hashlib.sha256(f"{numba.__version__} {sorted(FLAGS.items())!r} {LANES}".encode())
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _user_cache() -> Path:
+    """The user's cache folder, by the custom of the platform."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+
+
+def cache_directory() -> Path:
+    """Folder of the compiled kernels; the temporary folder stands in where the user's cannot be written."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    for root in (Path(named) if named else _user_cache() / "coralquake", Path(tempfile.gettempdir()) / "coralquake"):
+        folder = root / f"kernels-{_key()}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    raise OSError("no folder for compiled kernels can be written; set NUMBA_CACHE_DIR to one that can")
+
+
+_DIRECTORY = str(cache_directory())
+
+
+def kernel(function: Callable) -> Callable:
+    """Compile `function` at its first call and keep the result in `cache_directory()`.
+
+    numba fixes the folder when it decorates, so its setting is changed for that moment only: other packages keep theirs.
+    """
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _DIRECTORY
+    try:
+        return numba.njit(cache=True, **FLAGS)(function)
+    finally:
+        numba.config.CACHE_DIR = before

@@ -1,0 +1,125 @@
+"""From a Spec to what is marched: mesh, system, damping; and the batches of cases that share them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .assembly import Constraints, JointMaterial, Material, System, build_system
+from .boxmesh import box_mesh, column_mesh
+from .mesh import Floats, Mesh
+from .modes import natural_frequencies, rayleigh_coefficients
+from .newmark import Newmark, Rayleigh, Stepper
+from .simulate import Response, simulate
+from .spec import Spec
+from .state import Lanes
+
+N_FREQUENCIES = 6
+
+
+@dataclass(frozen=True)
+class Model:
+    """What the cases of a batch share: `spec` is any of them.
+
+    frequencies : (N_FREQUENCIES,) [Hz] of the bonded system; joint_groups : (layer, element length) of every joint material
+    """
+
+    spec: Spec
+    system: System
+    joint_groups: tuple[tuple[int, float], ...]
+    frequencies: Floats
+    rayleigh: Rayleigh
+
+    def joint_materials(self, spec: Spec) -> tuple[JointMaterial, ...]:
+        """Joint materials of a case."""
+        return joint_materials(spec, self.joint_groups)
+
+    def weight(self, spec: Spec) -> Floats:
+        """Self-weight load (n_dof,)."""
+        return self.system.weight * (spec.gravity.acceleration if spec.gravity.self_weight else 0.0)
+
+    def pressure(self, spec: Spec) -> Floats:
+        """Water pressure load (n_dof,): p = p0 depth / reference_height on the box's outer face, inward."""
+        depth = -self.system.mesh.nodes[:, 1]
+        return self.system.pressure_load(depth / spec.pressure.reference_height) * spec.pressure.p0
+
+
+def joint_materials(spec: Spec, groups: Sequence[tuple[int, float]]) -> tuple[JointMaterial, ...]:
+    """k_n = constrained modulus / t_j, k_s = G / t_j and friction of the adjacent layer, one a group."""
+    result = []
+    for index, length in groups:
+        layer, joint = spec.layer[index], spec.joint
+        thickness = joint.thickness if joint.thickness_ratio is None else joint.thickness_ratio * length
+        result.append(JointMaterial(layer.constrained_modulus / thickness, layer.shear_modulus / thickness, layer.friction))
+    return tuple(result)
+
+
+def materials(spec: Spec) -> list[Material]:
+    """One a layer, the structure last, as `box_mesh` counts them."""
+    ground = [Material(layer.young_modulus, layer.nu, layer.rho) for layer in spec.layer]
+    return [*ground, Material(spec.box.E, spec.box.nu, spec.box.density)]
+
+
+def build_model(spec: Spec) -> Model:
+    """Mesh, assemble, find the frequencies and the damping that follows from them (D5)."""
+    meshed = box_mesh(spec)
+    system = build_system(
+        meshed.mesh,
+        materials(spec),
+        joint_materials(spec, meshed.joint_groups),
+        Constraints.of_sides(meshed.mesh, spec.supports.sides),
+        quadrature=spec.joint.quadrature,
+        lumped=spec.mesh.mass == "lumped",
+    )
+    frequencies = natural_frequencies(system, N_FREQUENCIES)
+    pair = spec.damping.frequencies or (frequencies[0], frequencies[1])
+    alpha, beta = rayleigh_coefficients(spec.damping.ratio, *pair)
+    return Model(spec, system, meshed.joint_groups, frequencies, Rayleigh(alpha, beta, spec.damping.joints))
+
+
+def newmark_of(spec: Spec) -> Newmark:
+    """Time stepping of a case."""
+    return Newmark(spec.time.dt, spec.time.newmark_beta, spec.time.newmark_gamma)
+
+
+def simulate_cases(
+    model: Model, specs: Sequence[Spec], motions: Sequence[Floats], progress: Callable[[int], None] | None = None
+) -> Response:
+    """March cases that share `model` side by side; motions (n_step + 1, 2) [m/s²] of each."""
+    loads = [(model.weight(spec), model.pressure(spec)) for spec in specs]
+    laws = [model.system.joint_law(model.joint_materials(spec)) for spec in specs]
+    lanes = Lanes.of([weight + pressure for weight, pressure in loads], laws, list(motions))
+    static = [np.zeros_like(lanes.standing), np.zeros_like(lanes.standing)]
+    for lane, pair in enumerate(loads):
+        static[0][:, lane], static[1][:, lane] = pair
+    stepper = Stepper(model.system, newmark_of(model.spec), model.rayleigh)
+    every = model.spec.output.every
+    return simulate(stepper, lanes, static, model.frequencies[0], every=every, progress=progress)
+
+
+@dataclass(frozen=True)
+class FreeField:
+    """Racking of the ground without the box between the depths of roof and invert: history (n_lane, n_time) and peak (n_lane,) [m]."""
+
+    racking: Floats
+    peak: Floats
+
+
+def free_field(model: Model, motions: Sequence[Floats]) -> FreeField:
+    """The layered column under the same motions, on the model's own lines, with its damping coefficients and time steps."""
+    spec = model.spec
+    mesh = column_mesh(_side_lines(model.system.mesh), spec.layer)
+    roof, invert = -spec.box.depth, -spec.box.depth - spec.box.height
+    mesh = mesh.with_probe("roof", 0.0, roof).with_probe("invert", 0.0, invert)
+    held = Constraints.of_sides(mesh, "tied")
+    system = build_system(mesh, materials(spec), (), held, lumped=spec.mesh.mass == "lumped")
+    lanes = Lanes.of([np.zeros(system.n_dof)] * len(motions), [system.joint_law()] * len(motions), list(motions))
+    stepper = Stepper(system, newmark_of(spec), Rayleigh(model.rayleigh.alpha, model.rayleigh.beta))
+    response = simulate(stepper, lanes, [], natural_frequencies(system, 1)[0])
+    points = response.recorder.displacement(response.values)
+    racking = points[:, :, 0, 0] - points[:, :, 1, 0]
+    return FreeField(racking[:, :: spec.output.every], np.abs(racking).max(axis=1))
+
+
+def _side_lines(mesh: Mesh) -> Floats:
+    return mesh.nodes[mesh.boundaries["left"], 1]

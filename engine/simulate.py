@@ -1,0 +1,237 @@
+"""The only time loop: a batch of lanes from its static equilibrium through the shaking to a Response."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from .assembly import System, rows
+from .kernels.jit import LANES
+from .kernels.joint import OPEN
+from .kernels.march import JOINT_ELASTIC, STRAIN, audit, joint_fractions, observe, observe_joints
+from .kernels.sparse import Rows, product
+from .mesh import Floats
+from .newmark import Stepper, StepReport
+from .recorder import Recorder
+from .state import Lanes, State
+from .static import equilibrium
+
+OPENING, SLIP, PRESSURE, PENETRATION = range(4)
+"""Rows of Response.joint_peaks."""
+
+
+class Status(IntEnum):
+    """How a case ended."""
+
+    DONE = 0
+    SUBSTEPS = 1
+    NOT_CONVERGED = 2
+    NOT_RUN = 3
+    NO_EQUILIBRIUM = 4
+    NON_FINITE = 5
+    WORKER_LOST = 6
+
+
+class ConvergenceError(RuntimeError):
+    """A case failed and the caller asked for an exception."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a batch did, lane first. A failed lane holds NaN and says why in `reason`.
+
+    time : (n_time,) [s]; values : (n_lane, n_time, n_value) in the recorder's order; fractions : (n_lane, n_time, 2) open, slipping
+    peaks : (n_lane, 2, n_value) largest magnitudes, total and minus static
+    joint_peaks : (n_lane, 4, n_point) opening [m], slip [m], pressure [Pa], penetration [m]; first_slip : (n_lane, n_point) [s]
+    static_open : (n_lane, n_point) 1 where the joint carries no pressure before shaking; static_gap : (n_lane, n_point) [m]
+    static_values : (n_lane, n_value)
+    shape : (n_lane, n_node, 2) displacement at the moment of the largest racking, shape_time : (n_lane,) [s],
+    shape_state : (n_lane, n_point) joint states then
+    iterations, residual, source_residual, energy_error, contact_drift : (n_lane,)
+    """
+
+    recorder: Recorder
+    time: Floats
+    values: Floats
+    fractions: Floats
+    peaks: Floats
+    joint_peaks: Floats
+    first_slip: Floats
+    static_open: Floats
+    static_gap: Floats
+    static_values: Floats
+    shape: Floats
+    shape_time: Floats
+    shape_state: Floats
+    status: np.ndarray
+    reason: tuple[str, ...]
+    iterations: Floats
+    residual: Floats
+    energy_error: Floats
+    contact_drift: Floats
+
+
+def simulate(
+    stepper: Stepper,
+    lanes: Lanes,
+    static_loads: list[Floats],
+    first_frequency: float,
+    *,
+    every: int = 1,
+    throw: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> Response:
+    """March all lanes from their equilibrium under `static_loads` (n_dof, LANES) to the end of their motions.
+
+    Histories keep every `every`-th step, peaks see all. `throw` raises ConvergenceError for the first failed lane; otherwise
+    failure is a status. `progress` is called with the number of steps done, every hundred.
+    """
+    run = _Run(stepper, lanes, every)
+    run.settle(static_loads, first_frequency)
+    for step in range(1, len(lanes.ground)):
+        run.advance(step)
+        if progress is not None and step % 100 == 0:
+            progress(step)
+        if not run.alive.any():
+            break
+    response = run.response()
+    if throw and (response.status >= Status.NOT_CONVERGED).any():
+        lane = int(np.argmax(response.status >= Status.NOT_CONVERGED))
+        raise ConvergenceError(f"case {lane}: {response.reason[lane]}")
+    return response
+
+
+class _Run:
+    """The arrays that a march fills."""
+
+    def __init__(self, stepper: Stepper, lanes: Lanes, every: int) -> None:
+        self.stepper, self.lanes, self.every = stepper, lanes, every
+        self.system: System = stepper.system
+        self.recorder = Recorder.of(self.system)
+        self._operator: Rows = rows(self.recorder.operator)
+        n_value, n_point = self.recorder.operator.shape[0], len(self.system.points)
+        n_kept = (len(lanes.ground) - 1) // every + 1
+        self.state = State.at_rest(self.system)
+        self.values: Floats = np.zeros((n_value, LANES))
+        self.kept: Floats = np.full((n_kept, n_value, LANES), np.nan)
+        self.fractions: Floats = np.full((n_kept, 2, LANES), np.nan)
+        self.peaks: Floats = np.zeros((2, n_value, LANES))
+        self.joint_peaks: Floats = np.zeros((4, LANES, n_point))
+        self.first_slip: Floats = np.full((LANES, n_point), np.nan)
+        self.shape: Floats = np.zeros((self.system.n_dof, LANES))
+        self.shape_time: Floats = np.zeros(LANES)
+        self.shape_state: Floats = np.zeros((LANES, n_point))
+        self.iterations: Floats = np.zeros(LANES)
+        self.residual: Floats = np.zeros(LANES)
+        self.account: Floats = np.zeros((3, LANES))
+        self.status = np.full(LANES, Status.NOT_RUN, dtype=np.int64)
+        self.status[: lanes.n_lane] = Status.DONE
+        self.reason = [""] * LANES
+
+    @property
+    def alive(self) -> np.ndarray:
+        """Lanes that are marching, (LANES,)."""
+        return self.status <= Status.SUBSTEPS
+
+    def settle(self, static_loads: list[Floats], first_frequency: float) -> None:
+        """Static stage, then the state at t = 0."""
+        self.state, found = equilibrium(self.system, self.lanes, static_loads, first_frequency)
+        for lane in np.flatnonzero(self.alive & ~found):
+            self._drop(int(lane), Status.NO_EQUILIBRIUM, "no static equilibrium: nothing holds the box under these loads")
+        self.stepper.start(self.state, self.lanes, self.lanes.ground[0])
+        motion, contact = self.state.motion, self.state.contact
+        force = contact.force.reshape(LANES, -1, 2)
+        stiffness = np.stack([self.lanes.law.k_n, self.lanes.law.k_s], axis=2)
+        self.start_energy = np.stack(
+            [0.5 * (motion.u * motion.Ku).sum(axis=0), 0.5 * (force**2 / stiffness).sum(axis=(1, 2))]
+        )
+        self.state.energy[STRAIN], self.state.energy[JOINT_ELASTIC] = self.start_energy
+        product(self._operator, motion.u, self.values)
+        self.static_values = self.values.copy()
+        self.static_open = (contact.state == OPEN).astype(float)
+        self.static_gap = contact.gap[:, ::2].copy()
+        self._observe(0)
+
+    def advance(self, step: int) -> None:
+        """One step of all lanes and what is read from it."""
+        ground = self.lanes.ground
+        report = self.stepper.step(self.state, self.lanes, ground[step - 1], ground[step])
+        self._judge(step, report)
+        audit(self.state.energy, self.start_energy, self.account)
+        product(self._operator, self.state.motion.u, self.values)
+        self._observe(step)
+
+    def _judge(self, step: int, report: StepReport) -> None:
+        n = self.lanes.n_lane
+        np.maximum(self.iterations[:n], report.rounds[:n], out=self.iterations[:n])
+        np.maximum(self.residual[:n], report.residual[:n], out=self.residual[:n])
+        time = step * self.stepper.newmark.dt
+        finite = np.isfinite(self.state.energy).all(axis=0)
+        if finite[:n].all() and not report.halved.any():
+            return
+        for lane in np.flatnonzero(self.alive):
+            if report.failed[lane]:
+                text = f"joint states not found at t = {time:g} s, down to a step of dt/64; residual {report.residual[lane]:.1e}"
+                self._drop(int(lane), Status.NOT_CONVERGED, text)
+            elif not finite[lane]:
+                self._drop(int(lane), Status.NON_FINITE, f"a value is no longer finite at t = {time:g} s")
+            elif report.halved[lane]:
+                self.status[lane] = Status.SUBSTEPS
+
+    def _drop(self, lane: int, status: Status, reason: str) -> None:
+        """Take a lane out: its state becomes zero so that nothing non-finite marches on."""
+        self.status[lane], self.reason[lane] = status, reason
+        self.state.put(lane, State.at_rest(self.system))
+        self.lanes.standing[:, lane] = 0.0
+        self.lanes.ground[:, :, lane] = 0.0
+
+    def _observe(self, step: int) -> None:
+        time = step * self.stepper.newmark.dt
+        record_holder = np.zeros(LANES, dtype=bool)
+        observe(self.values, self.static_values, self.peaks, self.recorder.racking, record_holder)
+        n, area = self.lanes.n_lane, self.system.points.area
+        if len(area):
+            observe_joints(self.state.contact, area, n, time, self.joint_peaks, self.first_slip)
+        for lane in np.flatnonzero(record_holder):
+            self.shape[:, lane] = self.state.motion.u[:, lane]
+            self.shape_state[lane] = self.state.contact.state[lane]
+            self.shape_time[lane] = time
+        if step % self.every == 0:
+            row = step // self.every
+            self.kept[row] = self.values
+            joint_fractions(self.state.contact.state, self.system.points.length, n, self.fractions[row])
+
+    def response(self) -> Response:
+        """Everything kept, lane first, with failed lanes emptied."""
+        n = self.lanes.n_lane
+        scale = np.where(self.account[2] > 0, self.account[2], 1.0)
+        failed = self.status[:n] >= Status.NOT_CONVERGED
+        expand = self.system.expand
+
+        def of_lanes(array: Floats, axis: int) -> Floats:
+            chosen = np.moveaxis(array, axis, 0)[:n].copy()
+            chosen[failed] = np.nan
+            return chosen
+
+        return Response(
+            recorder=self.recorder,
+            time=np.arange(len(self.kept)) * self.every * self.stepper.newmark.dt,
+            values=of_lanes(self.kept, 2),
+            fractions=of_lanes(self.fractions, 2),
+            peaks=of_lanes(self.peaks, 2),
+            joint_peaks=of_lanes(self.joint_peaks, 1),
+            first_slip=of_lanes(self.first_slip, 0),
+            static_open=of_lanes(self.static_open, 0),
+            static_gap=of_lanes(self.static_gap, 0),
+            static_values=of_lanes(self.static_values, 1),
+            shape=of_lanes((expand @ self.shape).reshape(-1, 2, LANES), 2),
+            shape_time=of_lanes(self.shape_time, 0),
+            shape_state=of_lanes(self.shape_state, 0),
+            status=self.status[:n].copy(),
+            reason=tuple(self.reason[:n]),
+            iterations=of_lanes(self.iterations, 0),
+            residual=of_lanes(self.residual, 0),
+            energy_error=of_lanes(self.account[0] / scale, 0),
+            contact_drift=of_lanes(self.account[1] / scale, 0),
+        )

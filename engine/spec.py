@@ -1,0 +1,247 @@
+"""What a model is: frozen descriptions in SI. Every field declares its unit, its rule and its meaning once.
+
+The defaults are the reference problem "coral-2010" (Ngân 2010) on the recommended mesh. The source does not say how deep the
+box lies nor how the sides are held: the roof is taken at 4 m depth, where the box fills layer 3, the box is centred, and the
+pressure grows linearly with depth from zero at the surface.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from .units import Quantity
+
+STANDARD_GRAVITY = 9.81
+"""[m/s²], turns a unit weight into a density."""
+
+
+class Section(BaseModel):
+    """A table of the study file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False)
+
+
+class Domain(Section):
+    """The cut-out of the ground; the surface is y = 0, the base y = -depth, x = 0 the middle."""
+
+    width: Quantity("m", "width of the domain", gt=0) = 20.0
+    depth: Quantity("m", "depth of the rigid base", gt=0) = 14.0
+
+
+class Box(Section):
+    """The buried structure."""
+
+    width: Quantity("m", "outer width", gt=0) = 5.0
+    height: Quantity("m", "outer height", gt=0) = 4.0
+    wall: Quantity("m", "thickness of walls, roof and floor", gt=0) = 0.5
+    depth: Quantity("m", "depth of the roof's outer face", ge=0) = 4.0
+    offset: Quantity("m", "position of the box's axis, 0 is the middle of the domain") = 0.0
+    E: Quantity("Pa", "Young's modulus", gt=0) = 34e9
+    nu: Quantity("1", "Poisson's ratio", ge=0, lt=0.5) = 0.3
+    density: Quantity("kg/m**3", "density", gt=0) = 2500.0
+
+
+class Layer(Section):
+    """One layer of the ground, from the layer above down to `bottom`; the last one goes on below."""
+
+    bottom: Quantity("m", "depth of its lower boundary", gt=0)
+    nu: Quantity("1", "Poisson's ratio", ge=0, lt=0.5)
+    friction: Quantity("1", "friction coefficient of the box against it", ge=0)
+    E: Quantity("Pa", "Young's modulus (or give G or Vs)", gt=0) | None = None
+    G: Quantity("Pa", "shear modulus", gt=0) | None = None
+    Vs: Quantity("m/s", "shear wave velocity", gt=0) | None = None
+    density: Quantity("kg/m**3", "density (or give unit_weight)", gt=0) | None = None
+    unit_weight: Quantity("N/m**3", "unit weight", gt=0) | None = None
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> "Layer":
+        for names in (("E", "G", "Vs"), ("density", "unit_weight")):
+            given = [name for name in names if getattr(self, name) is not None]
+            if len(given) != 1:
+                raise ValueError(f"must have exactly one of {', '.join(names)}, has {' and '.join(given) or 'none'}")
+        return self
+
+    @property
+    def rho(self) -> float:
+        """Density [kg/m³]."""
+        return self.density if self.density is not None else self.unit_weight / STANDARD_GRAVITY
+
+    @property
+    def shear_modulus(self) -> float:
+        """G [Pa]."""
+        if self.E is not None:
+            return self.E / (2 * (1 + self.nu))
+        return self.G if self.G is not None else self.rho * self.Vs**2
+
+    @property
+    def young_modulus(self) -> float:
+        """E [Pa]."""
+        return self.E if self.E is not None else 2 * (1 + self.nu) * self.shear_modulus
+
+    @property
+    def constrained_modulus(self) -> float:
+        """E(1-nu)/((1+nu)(1-2nu)) [Pa], the stiffness against compression without lateral strain."""
+        return 2 * self.shear_modulus * (1 - self.nu) / (1 - 2 * self.nu)
+
+
+def _coral_layers() -> tuple[Layer, ...]:
+    table = (
+        (1.0, 2.8e8, 0.22, 2500.0, 0.21),
+        (4.0, 2.1e9, 0.25, 2800.0, 0.32),
+        (8.0, 2.0e10, 0.25, 2900.0, 0.41),
+        (10.0, 2.6e9, 0.25, 2000.0, 0.47),
+        (14.0, 2.3e10, 0.25, 3000.0, 0.38),
+    )
+    return tuple(Layer(bottom=b, E=E, nu=nu, density=rho, friction=f) for b, E, nu, rho, f in table)
+
+
+class Pressure(Section):
+    """p = p0 (depth / reference_height), inward on the box's outer face. A given load, not a water depth."""
+
+    p0: Quantity("Pa", "pressure at the reference height") = 2e6
+    reference_height: Quantity("m", "depth at which the pressure is p0", gt=0) = 14.0
+
+
+class Motion(Section):
+    """Rigid-base motion. A record is a file beside the study or one of those shipped; "none" leaves the direction out."""
+
+    record: Annotated[str, Field(description="horizontal record (PEER AT2)")] = "ridgecrest-2019-clc-360.AT2"
+    peak: Quantity("m/s**2", "horizontal peak to scale to; left out: as recorded", gt=0) | None = 1.7085
+    vertical_record: Annotated[str, Field(description="vertical record (PEER AT2)")] = "none"
+    vertical_peak: Quantity("m/s**2", "vertical peak to scale to; left out: scaled as the horizontal", gt=0) | None = None
+    scale: Quantity("1", "factor on both directions") = 1.0
+
+
+class Damping(Section):
+    """Rayleigh damping C = alpha M + beta K (D5)."""
+
+    ratio: Quantity("1", "damping ratio at two frequencies", ge=0, lt=1) = 0.05
+    frequencies: Annotated[
+        tuple[Quantity("Hz", "frequency", gt=0), Quantity("Hz", "frequency", gt=0)] | None,
+        Field(description="the two frequencies; left out: the first two of the bonded system"),
+    ] = None
+    joints: Annotated[bool, Field(description="whether beta acts on the joints' stiffness too, as in the source")] = False
+
+
+class Time(Section):
+    """Time stepping (D6)."""
+
+    dt: Quantity("s", "time step", gt=0) = 0.005
+    duration: Quantity("s", "how long the motion is followed", gt=0) = 20.0
+    newmark_beta: Quantity("1", "Newmark's beta, the source's alpha", gt=0, le=0.5) = 0.25
+    newmark_gamma: Quantity("1", "Newmark's gamma, the source's delta", ge=0.5, le=1) = 0.5
+
+
+class MeshOptions(Section):
+    """How fine the mesh is."""
+
+    wall_elements: Annotated[int, Field(ge=1, le=20, description="elements through a wall")] = 2
+    roof_elements: Annotated[int, Field(ge=2, le=200, multiple_of=2, description="elements along the clear width")] = 8
+    side_elements: Annotated[int, Field(ge=2, le=200, multiple_of=2, description="elements along the clear height")] = 6
+    first: Quantity("m", "size of the ground elements at the box", gt=0) = 0.5
+    growth: Quantity("1", "growth of their size, an element to the next, away from it", ge=1, le=4) = 1.25
+    largest_width: Quantity("m", "largest width of a ground element", gt=0) = 1.5
+    largest_height: Quantity("m", "largest height of a ground element", gt=0) = 0.8
+    mass: Annotated[Literal["consistent", "lumped"], Field(description="mass matrix")] = "consistent"
+
+
+class Joint(Section):
+    """The interface between box and ground. k_n = constrained modulus / t_j, k_s = G / t_j of the adjacent layer."""
+
+    thickness: Quantity("m", "joint thickness t_j", gt=0) = 0.05
+    thickness_ratio: Quantity("1", "t_j over the element's length; replaces thickness", gt=0) | None = None
+    quadrature: Annotated[
+        Literal["nodal", "one-point"], Field(description="joint points: at the nodes, or one in the middle as in the source")
+    ] = "nodal"
+
+
+class Supports(Section):
+    """How the sides are held; the base is fixed."""
+
+    sides: Annotated[
+        Literal["tied", "shear", "roller", "fixed"],
+        Field(
+            description="tied: left moves as right; shear: u_y = 0; roller: u_x = 0; fixed: both. shear carries no weight "
+            "rightly, so it is for horizontal motion without self-weight only"
+        ),
+    ] = "tied"
+
+
+class Gravity(Section):
+    """Self-weight of box and ground."""
+
+    self_weight: Annotated[bool, Field(description="whether it acts")] = True
+    acceleration: Quantity("m/s**2", "gravity", gt=0) = 9.81
+
+
+class Output(Section):
+    """What is kept."""
+
+    every: Annotated[int, Field(ge=1, le=100_000, description="histories keep every so many steps; peaks see all")] = 4
+    points: Annotated[
+        dict[str, tuple[Quantity("m", "x"), Quantity("m", "y")]],
+        Field(description="further points: name = [x, y], x from the middle of the domain, y up from the surface"),
+    ] = {}
+
+
+NAMED_POINTS = ("A", "B", "C", "D", "S", "F")
+"""Roof centre, right wall, left wall, invert centre (outer faces), surface above the box, surface at the side."""
+
+
+class Spec(Section):
+    """One case: everything that decides its result."""
+
+    domain: Domain = Domain()
+    box: Box = Box()
+    layer: Annotated[tuple[Layer, ...], Field(min_length=1)] = _coral_layers()
+    pressure: Pressure = Pressure()
+    motion: Motion = Motion()
+    damping: Damping = Damping()
+    time: Time = Time()
+    mesh: MeshOptions = MeshOptions()
+    joint: Joint = Joint()
+    supports: Supports = Supports()
+    gravity: Gravity = Gravity()
+    output: Output = Output()
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> "Spec":
+        if found := list(_conflicts(self)):
+            raise ValueError("\n".join(found))
+        return self
+
+
+def _conflicts(spec: Spec) -> Any:
+    """Rules between fields, each as 'field = value: rule'."""
+    box, domain, time = spec.box, spec.domain, spec.time
+    if box.depth + box.height >= domain.depth:
+        yield f"box.depth = {box.depth:g} m: box's floor at {box.depth + box.height:g} m must lie above domain.depth = {domain.depth:g} m"
+    if abs(box.offset) + box.width / 2 >= domain.width / 2:
+        yield f"box.width = {box.width:g} m: box must lie inside domain.width = {domain.width:g} m"
+    if 2 * box.wall >= min(box.width, box.height):
+        yield f"box.wall = {box.wall:g} m: two walls must leave room inside {box.width:g} m x {box.height:g} m"
+    bottoms = [layer.bottom for layer in spec.layer]
+    for i, (above, below) in enumerate(zip(bottoms, bottoms[1:], strict=False)):
+        if below <= above:
+            yield f"layer.{i + 2}.bottom = {below:g} m: must lie below the layer above it, which ends at {above:g} m"
+    if time.duration < time.dt:
+        yield f"time.duration = {time.duration:g} s: must be at least one time.dt = {time.dt:g} s"
+    elif time.duration / time.dt > 2e6:
+        yield f"time.duration = {time.duration:g} s: must be at most two million steps of time.dt = {time.dt:g} s"
+    if time.newmark_beta < (time.newmark_gamma + 0.5) ** 2 / 4 - 1e-12:
+        limit = (time.newmark_gamma + 0.5) ** 2 / 4
+        yield f"time.newmark_beta = {time.newmark_beta:g}: must be at least {limit:g}, or the scheme is not unconditionally stable"
+    if spec.supports.sides == "shear" and spec.gravity.self_weight:
+        yield 'supports.sides = "shear": would carry the self-weight; choose tied, or gravity.self_weight = false'
+    if spec.supports.sides == "shear" and spec.motion.vertical_record != "none":
+        yield 'supports.sides = "shear": is for horizontal motion only; choose tied or roller'
+    for name, (x, y) in spec.output.points.items():
+        if name in NAMED_POINTS:
+            yield f"output.points.{name}: is a name the model has already ({', '.join(NAMED_POINTS)})"
+        inside_box = abs(x - box.offset) < box.width / 2 - box.wall and box.wall < -y - box.depth < box.height - box.wall
+        if abs(x) > domain.width / 2 or not -domain.depth <= y <= 0 or inside_box:
+            yield f"output.points.{name} = [{x:g} m, {y:g} m]: must lie in the ground or in the box's walls"
+
+
+PRESETS: dict[str, dict[str, Any]] = {"coral-2010": {}}
+"""Named models: what differs from the defaults."""

@@ -1,0 +1,64 @@
+"""Quantities with units: what a study file writes ("20 m", "200 N/cm**2") becomes a float in SI."""
+
+import math
+import re
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, ValidationInfo
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
+
+
+@cache
+def _registry() -> Any:
+    import pint  # slow to import, and needed only where a study file carries units
+
+    return pint.UnitRegistry()
+
+
+@cache
+def _factor(written: str, wanted: str) -> float:
+    """What one `written` unit is in `wanted` units; ValueError where it is no such unit."""
+    import pint
+
+    try:
+        unit = _registry().parse_units(written)
+        return float(_registry().Quantity(1.0, unit).to(wanted).magnitude)
+    except pint.DimensionalityError:
+        raise ValueError(f"must be a quantity in {wanted} or a unit like it, {written} is not") from None
+    except Exception:  # pint passes on whatever its parser met
+        raise ValueError(f"unit {written!r} is not known; must be a unit like {wanted}") from None
+
+
+def in_si(value: Any, unit: str, unit_required: bool) -> float:
+    """`value` as a float in `unit` (an SI unit, or "1"). A bare number but zero is refused where `unit_required`."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError('must be a number with a unit in quotes, as in "2.5 ' + unit + '"' if unit != "1" else "must be a number")
+    if isinstance(value, str):
+        match = _NUMBER.fullmatch(value) if len(value) < 80 else None
+        if match is None:
+            raise ValueError(f'must be a number and a unit, as in "2.5 {unit}"' if unit != "1" else "must be a number")
+        number, written = float(match[1]), (match[2] or "")
+    else:
+        number, written = float(value), ""
+    if not math.isfinite(number):
+        raise ValueError("must be finite")
+    if written:
+        return number * _factor(written, "dimensionless" if unit == "1" else unit)
+    if unit_required and unit != "1" and number != 0.0:
+        raise ValueError(f'needs a unit, as in "{number:g} {unit}"')
+    return number
+
+
+def Quantity(unit: str, meaning: str, **rules: Any) -> Any:
+    """Type of a field: a float in `unit`, with its meaning and pydantic's rules (gt, ge, lt, le)."""
+
+    def convert(value: Any, info: ValidationInfo) -> Any:
+        if value is None:
+            return None
+        return in_si(value, unit, bool(info.context and info.context.get("from_file")))
+
+    return Annotated[
+        float, BeforeValidator(convert), Field(description=meaning, json_schema_extra={"unit": unit}, **rules)
+    ]
