@@ -1,0 +1,59 @@
+"""Box structures in layered ground under water pressure and earthquake, with an interface that opens and slips.
+
+Plane strain, T3, joints with Coulomb friction and no tension, Newmark; the linear part is condensed exactly and cases march in
+lanes. All arrays are in SI, or in any consistent units where a mesh is built from a user's own arrays.
+"""
+
+from .assembly import Constraints, JointMaterial, JointPoints, Material, System, build_system
+from .boxmesh import BoxMesh, box_mesh, column_mesh
+from .kernels.jit import LANES
+from .mesh import Mesh, MeshError, Probe
+from .model import Model, build_model, free_field, newmark_of, simulate_cases
+from .modes import natural_frequencies, rayleigh_coefficients
+from .motion import GroundMotion, MotionError, base_motion, read_at2
+from .newmark import Newmark, Rayleigh, Stepper
+from .recorder import Recorder
+from .simulate import ConvergenceError, Response, Status, simulate
+from .spec import PRESETS, Spec
+from .state import Lanes, State
+from .static import equilibrium
+
+__all__ = [
+    "LANES",
+    "PRESETS",
+    "BoxMesh",
+    "Constraints",
+    "ConvergenceError",
+    "GroundMotion",
+    "JointMaterial",
+    "JointPoints",
+    "Lanes",
+    "Material",
+    "Mesh",
+    "MeshError",
+    "Model",
+    "MotionError",
+    "Newmark",
+    "Probe",
+    "Rayleigh",
+    "Recorder",
+    "Response",
+    "Spec",
+    "State",
+    "Status",
+    "Stepper",
+    "System",
+    "base_motion",
+    "box_mesh",
+    "build_model",
+    "build_system",
+    "column_mesh",
+    "equilibrium",
+    "free_field",
+    "natural_frequencies",
+    "newmark_of",
+    "rayleigh_coefficients",
+    "read_at2",
+    "simulate",
+    "simulate_cases",
+]

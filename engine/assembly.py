@@ -208,9 +208,7 @@ def _sorted(matrix: sp.sparray) -> sp.csr_array:
     return result
 
 
-def _element_matrices(
-    mesh: Mesh, materials: Sequence[Material], thickness: float, lumped: bool
-) -> tuple[Floats, Floats, Floats]:
+def _element_matrices(mesh: Mesh, materials: Sequence[Material], thickness: float, lumped: bool) -> tuple[Floats, Floats, Floats]:
     """Stiffness and mass (n, 6, 6) and stress matrices (n, 3, 6) of all triangles."""
     E, nu, rho = (np.array([getattr(materials[i], name) for i in mesh.material], dtype=float) for name in ("E", "nu", "rho"))
     n = len(mesh.triangles)
@@ -254,7 +252,11 @@ def joint_points(mesh: Mesh, quadrature: Quadrature, thickness: float) -> JointP
     for e in range(len(mesh.joints)):
         places = [(0.5, 1.0)] if quadrature == "one-point" else [(0.0, 0.5), (1.0, 0.5)]
         for position, share in places:
-            pair = (e,) if quadrature == "one-point" else tuple(mesh.joints[e][[0, 3]] if position == 0.0 else mesh.joints[e][[1, 2]])
+            pair = (
+                (e,)
+                if quadrature == "one-point"
+                else tuple(mesh.joints[e][[0, 3]] if position == 0.0 else mesh.joints[e][[1, 2]])
+            )
             key = (pair, int(mesh.joint_material[e]), *np.round(normal[e], 9))
             point = found.setdefault(key, [e, position, before[e] + position * length[e], 0.0])
             point[3] += share * length[e]

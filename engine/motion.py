@@ -65,7 +65,9 @@ class GroundMotion:
         if ratio == 1:
             return self
         if abs(float(ratio) * dt / self.dt - 1) > 1e-9:
-            raise MotionError(f"{self.name}: step {self.dt:g} s cannot be brought to {dt:g} s by a ratio of whole numbers up to 1000")
+            raise MotionError(
+                f"{self.name}: step {self.dt:g} s cannot be brought to {dt:g} s by a ratio of whole numbers up to 1000"
+            )
         values = resample_poly(self.acceleration, ratio.numerator, ratio.denominator)
         return replace(self, dt=dt, acceleration=values)
 

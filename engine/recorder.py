@@ -76,5 +76,3 @@ def racking_operator(system: System) -> sp.csr_array:
         for node, sign in ((top_right, 0.5), (low_right, 0.5), (top_left, -0.5), (low_left, -0.5)):
             weights[1, 2 * node + 1] += sign * slope
     return sp.csr_array(weights) @ system.expand
-
-

@@ -143,9 +143,7 @@ class _Run:
         motion, contact = self.state.motion, self.state.contact
         force = contact.force.reshape(LANES, -1, 2)
         stiffness = np.stack([self.lanes.law.k_n, self.lanes.law.k_s], axis=2)
-        self.start_energy = np.stack(
-            [0.5 * (motion.u * motion.Ku).sum(axis=0), 0.5 * (force**2 / stiffness).sum(axis=(1, 2))]
-        )
+        self.start_energy = np.stack([0.5 * (motion.u * motion.Ku).sum(axis=0), 0.5 * (force**2 / stiffness).sum(axis=(1, 2))])
         self.state.energy[STRAIN], self.state.energy[JOINT_ELASTIC] = self.start_energy
         product(self._operator, motion.u, self.values)
         self.static_values = self.values.copy()

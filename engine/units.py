@@ -34,7 +34,9 @@ def _factor(written: str, wanted: str) -> float:
 def in_si(value: Any, unit: str, unit_required: bool) -> float:
     """`value` as a float in `unit` (an SI unit, or "1"). A bare number but zero is refused where `unit_required`."""
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError('must be a number with a unit in quotes, as in "2.5 ' + unit + '"' if unit != "1" else "must be a number")
+        raise ValueError(
+            'must be a number with a unit in quotes, as in "2.5 ' + unit + '"' if unit != "1" else "must be a number"
+        )
     if isinstance(value, str):
         match = _NUMBER.fullmatch(value) if len(value) < 80 else None
         if match is None:
@@ -59,6 +61,4 @@ def Quantity(unit: str, meaning: str, **rules: Any) -> Any:
             return None
         return in_si(value, unit, bool(info.context and info.context.get("from_file")))
 
-    return Annotated[
-        float, BeforeValidator(convert), Field(description=meaning, json_schema_extra={"unit": unit}, **rules)
-    ]
+    return Annotated[float, BeforeValidator(convert), Field(description=meaning, json_schema_extra={"unit": unit}, **rules)]

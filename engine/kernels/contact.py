@@ -1,8 +1,9 @@
 """The condensed joint solve of one lane (D9): g + G lambda(g) = g_free with the law of `joint` at every point.
 
 Unknowns are the forces of closed points, which keeps the system well conditioned however stiff the joint: a closed point adds
-1/k to the diagonal. The states of the last step are tried first with the factor kept from then; where they do not hold, block
-Gauss-Seidel sweeps propose states and a direct solve follows, until proposed and found states agree.
+1/k to the diagonal. The states of the last step are tried first, with the factor kept from then. Where a state does not hold,
+the solution itself says what comes next (a Newton step on the states); Newton can cycle, so every few rounds block Gauss-Seidel
+sweeps, which cannot, propose states instead, more of them each time.
 """
 
 from typing import NamedTuple
@@ -11,11 +12,12 @@ import numpy as np
 
 from .dense import factorise, solve
 from .jit import kernel
-from .joint import OPEN, STICK, balance, slip_sign
+from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
 
 EQUATION_TOLERANCE = 1e-12  # of D9
 STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep the state they have
-PROJECTED_ROUNDS = 8  # rounds that restart the sweeps from the direct solution; later ones continue the sweeps alone
+NEWTON_ROUNDS = 8  # direct solves between sweeps
+FIRST_SWEEPS = 8  # sweeps of the first time, doubled every time
 
 
 class Law(NamedTuple):
@@ -37,6 +39,7 @@ class Workspace(NamedTuple):
     swept: np.ndarray  # (m,) forces of the sweeps
     free: np.ndarray  # (m,) g_free of the lane at work
     proposal: np.ndarray  # (n_point,)
+    tried: np.ndarray  # (n_point,)
 
 
 def workspace(n_point: int, lanes: int) -> Workspace:
@@ -50,6 +53,7 @@ def workspace(n_point: int, lanes: int) -> Workspace:
         np.zeros(m),
         np.zeros(m),
         np.zeros(m),
+        np.zeros(n_point, dtype=np.int8),
         np.zeros(n_point, dtype=np.int8),
     )
 
@@ -173,32 +177,34 @@ def _direct(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, u
 
 
 @kernel
-def _holds(state, g, lam, slip, k_s, mu, g_scale, lam_scale):
-    """Whether every point may stay in its state: no tension, no penetration of open points, the Coulomb limit, slip forward."""
-    g_tol, lam_tol = STATE_TOLERANCE * g_scale, STATE_TOLERANCE * lam_scale
-    for p in range(state.shape[0]):
-        n, s = 2 * p, 2 * p + 1
-        if state[p] == OPEN:
-            if g[n] < -g_tol:
-                return False
-        elif lam[n] > lam_tol:
-            return False
-        elif state[p] == STICK:
-            if abs(lam[s]) > -mu[p] * lam[n] + lam_tol:
-                return False
-        elif mu[p] > 0.0 and slip_sign(state[p]) * (g[s] - lam[s] / k_s[p] - slip[p]) < -g_tol:
-            return False
-    return True
+def _next_state(state, gap_n, normal, excess, forward):
+    """The state that follows from a solution in which this one may not hold: `excess` of shear over the Coulomb limit, slip `forward`."""
+    if state == OPEN:
+        return STICK if gap_n < 0.0 else OPEN
+    if normal > 0.0:
+        return OPEN
+    if state == STICK and excess > 0.0:
+        return SLIP_FORWARD if forward > 0.0 else SLIP_BACKWARD
+    if state != STICK and forward < 0.0:
+        return STICK
+    return state
 
 
 @kernel
-def _project(state, lam, mu):
-    """Bring forces back onto the law's cone before sweeps restart from them."""
+def _revise(g, lam, slip, k_s, mu, g_tol, lam_tol, state):
+    """Replace the states that do not hold; True where all did: no tension, no penetration, the Coulomb limit, slip forward."""
+    all_hold = True
     for p in range(state.shape[0]):
         n, s = 2 * p, 2 * p + 1
-        lam[n] = min(lam[n], 0.0)
-        limit = -mu[p] * lam[n]
-        lam[s] = max(-limit, min(limit, lam[s]))
+        gap_n, normal, excess, forward = g[n] + g_tol, lam[n] - lam_tol, 0.0, 0.0
+        if state[p] == STICK:
+            excess, forward = abs(lam[s]) + mu[p] * lam[n] - lam_tol, lam[s]
+        elif state[p] != OPEN and mu[p] > 0.0:
+            forward = slip_sign(state[p]) * (g[s] - lam[s] / k_s[p] - slip[p]) + g_tol
+        following = _next_state(state[p], gap_n, normal, excess, forward)
+        all_hold = all_hold and following == state[p]
+        state[p] = np.int8(following)
+    return all_hold
 
 
 @kernel
@@ -231,23 +237,22 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     Returns (rounds, residual): how many direct solves it took, -1 where `max_rounds` did not do, and the relative residual.
     """
     k_n, k_s, mu = law.k_n[lane], law.k_s[lane], law.mu[lane]
-    lu, pivot, factored = work.lu[lane], work.pivot[lane], work.factored[lane]
-    g_scale = _largest(g_free)
-    if not np.isfinite(g_scale):
-        return -1, np.inf
+    lu, pivot, factored, proposal = work.lu[lane], work.pivot[lane], work.factored[lane], work.proposal
+    g_tol = STATE_TOLERANCE * _largest(g_free)
     work.swept[:] = lam
-    work.proposal[:] = state
-    residual = np.inf
-    for attempt in range(max_rounds):
-        residual = _direct(
-            G, g_free, k_n, k_s, mu, slip, work.proposal, g, lam, lu, pivot, factored, work.unknown, work.product
-        )
-        if residual <= EQUATION_TOLERANCE and _holds(work.proposal, g, lam, slip, k_s, mu, g_scale, _largest(lam)):
-            state[:] = work.proposal
-            return attempt + 1, residual
-        if 0 < attempt <= PROJECTED_ROUNDS and residual < np.inf:
-            _project(work.proposal, lam, mu)
-            work.swept[:] = lam
-        for _ in range(3 if attempt <= PROJECTED_ROUNDS else 3 * (attempt - PROJECTED_ROUNDS)):
-            _sweep(G, g_free, k_n, k_s, mu, slip, work.swept, work.proposal)
+    proposal[:] = state
+    residual, sweeps = np.inf, FIRST_SWEEPS
+    for attempt in range(1, max_rounds + 1):
+        residual = _direct(G, g_free, k_n, k_s, mu, slip, proposal, g, lam, lu, pivot, factored, work.unknown, work.product)
+        if not np.isfinite(residual):
+            break
+        work.tried[:] = proposal
+        held = _revise(g, lam, slip, k_s, mu, g_tol, STATE_TOLERANCE * _largest(lam), proposal)
+        if held and residual <= EQUATION_TOLERANCE:
+            state[:] = work.tried
+            return attempt, residual
+        if attempt % NEWTON_ROUNDS == 0:
+            for _ in range(sweeps):
+                _sweep(G, g_free, k_n, k_s, mu, slip, work.swept, proposal)
+            sweeps *= 2
     return -1, residual

@@ -8,9 +8,7 @@ from .jit import kernel
 @kernel
 def area(xy):
     """Signed area of one triangle with corners `xy` (3, 2); positive where they run counter-clockwise."""
-    return 0.5 * (
-        (xy[1, 0] - xy[0, 0]) * (xy[2, 1] - xy[0, 1]) - (xy[2, 0] - xy[0, 0]) * (xy[1, 1] - xy[0, 1])
-    )
+    return 0.5 * ((xy[1, 0] - xy[0, 0]) * (xy[2, 1] - xy[0, 1]) - (xy[2, 0] - xy[0, 0]) * (xy[1, 1] - xy[0, 1]))
 
 
 @kernel
