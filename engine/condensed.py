@@ -62,6 +62,7 @@ class Condensed:
         self.u: Floats = np.zeros((system.n_dof, LANES))
         self.rounds = np.zeros(LANES, dtype=np.int64)
         self.residual: Floats = np.zeros(LANES)
+        self.source: Floats = np.zeros(LANES)
         self._tail: Floats = np.zeros((system.n_dof, LANES))
         self._gap: Floats = np.zeros((m, LANES))
         self._work: Workspace = workspace(self.n_point, LANES)
@@ -85,7 +86,7 @@ class Condensed:
     def solve(
         self, rhs: Floats, law: Law, n_lane: int, before: Contact, found: Contact, damping: JointDamping | None = None
     ) -> Floats:
-        """Fill self.u, self.rounds, self.residual and `found`, take the joint forces off `rhs`; (n_lane,) True where it failed.
+        """Fill self.u, self.rounds, self.residual, self.source and `found`, take the joint forces off `rhs`; (n_lane,) True where it failed.
 
         rhs : (n_dof, LANES); before : joint state the solve starts from; a lane that fails is given that state's forces.
         """
@@ -100,7 +101,9 @@ class Condensed:
         for name in ("gap", "force", "state"):
             getattr(found, name)[:] = getattr(before, name)
         G = self.G if damping is None else damping.G
-        solve_joints(G, self._gap, law, n_lane, MAX_ROUNDS, self._work, before.slip, found, self.rounds, self.residual)
+        solve_joints(
+            G, self._gap, law, n_lane, MAX_ROUNDS, self._work, before.slip, found, self.rounds, self.residual, self.source
+        )
         failed = self.rounds[:n_lane] < 0
         for lane in np.flatnonzero(failed):
             for name in ("gap", "force", "state"):

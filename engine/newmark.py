@@ -51,10 +51,11 @@ class Newmark:
 
 @dataclass(frozen=True)
 class StepReport:
-    """Of one step, (LANES,): direct solves, relative residual, whether it was halved, whether even that failed."""
+    """Of one step, (LANES,): direct solves, relative residual (D9), the source's test, whether it was halved, whether even that failed."""
 
     rounds: np.ndarray
     residual: Floats
+    source: Floats
     halved: np.ndarray
     failed: np.ndarray
 
@@ -99,9 +100,8 @@ class Stepper:
         failed = self._solve(state, lanes, ground_end)
         before = {lane: state.alone(lane) for lane in np.flatnonzero(failed)}
         self._commit(state, lanes, ground, ground_end)
-        report = StepReport(
-            self.condensed.rounds.copy(), self.condensed.residual.copy(), np.zeros(LANES, bool), np.zeros(LANES, bool)
-        )
+        solver, no = self.condensed, np.zeros(LANES, bool)
+        report = StepReport(solver.rounds.copy(), solver.residual.copy(), solver.source.copy(), no, no.copy())
         for lane, start in before.items():
             report.halved[lane] = True
             report.failed[lane] = not self._in_halves(state, lane, start, lanes, ground, ground_end, report)
@@ -136,6 +136,7 @@ class Stepper:
                 state.put(lane, trial)
                 report.rounds[lane] = stepper.condensed.rounds[0]
                 report.residual[lane] = stepper.condensed.residual[0]
+                report.source[lane] = stepper.condensed.source[0]
                 return True
         return False
 

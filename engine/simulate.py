@@ -43,12 +43,13 @@ class Response:
 
     time : (n_time,) [s]; values : (n_lane, n_time, n_value) in the recorder's order; fractions : (n_lane, n_time, 2) open, slipping
     peaks : (n_lane, 2, n_value) largest magnitudes, total and minus static
-    joint_peaks : (n_lane, 4, n_point) opening [m], slip [m], pressure [Pa], penetration [m]; first_slip : (n_lane, n_point) [s]
+    joint_peaks : (n_lane, 4, n_point) opening [m], slip [m], pressure [Pa], penetration [m]
+    first_slip : (n_lane, n_point) [s] when a closed point first slid beyond its elastic range before the shaking, NaN where never
     static_open : (n_lane, n_point) 1 where the joint carries no pressure before shaking; static_gap : (n_lane, n_point) [m]
     static_values : (n_lane, n_value)
     shape : (n_lane, n_node, 2) displacement at the moment of the largest racking, shape_time : (n_lane,) [s],
     shape_state : (n_lane, n_point) joint states then
-    iterations, residual, source_residual, energy_error, contact_drift : (n_lane,)
+    iterations, residual, source_test, energy_error, contact_drift : (n_lane,)
     """
 
     recorder: Recorder
@@ -68,6 +69,7 @@ class Response:
     reason: tuple[str, ...]
     iterations: Floats
     residual: Floats
+    source_test: Floats
     energy_error: Floats
     contact_drift: Floats
 
@@ -124,6 +126,7 @@ class _Run:
         self.shape_state: Floats = np.zeros((LANES, n_point))
         self.iterations: Floats = np.zeros(LANES)
         self.residual: Floats = np.zeros(LANES)
+        self.source_test: Floats = np.zeros(LANES)
         self.account: Floats = np.zeros((3, LANES))
         self.status = np.full(LANES, Status.NOT_RUN, dtype=np.int64)
         self.status[: lanes.n_lane] = Status.DONE
@@ -149,6 +152,8 @@ class _Run:
         self.static_values = self.values.copy()
         self.static_open = (contact.state == OPEN).astype(float)
         self.static_gap = contact.gap[:, ::2].copy()
+        self.slip_before = contact.slip.copy()
+        self.elastic_range = self.lanes.law.mu * np.abs(force[:, :, 0]) / self.lanes.law.k_s
         self._observe(0)
 
     def advance(self, step: int) -> None:
@@ -164,6 +169,7 @@ class _Run:
         n = self.lanes.n_lane
         np.maximum(self.iterations[:n], report.rounds[:n], out=self.iterations[:n])
         np.maximum(self.residual[:n], report.residual[:n], out=self.residual[:n])
+        np.maximum(self.source_test[:n], report.source[:n], out=self.source_test[:n])
         time = step * self.stepper.newmark.dt
         finite = np.isfinite(self.state.energy).all(axis=0)
         if finite[:n].all() and not report.halved.any():
@@ -190,7 +196,9 @@ class _Run:
         observe(self.values, self.static_values, self.peaks, self.recorder.racking, record_holder)
         n, area = self.lanes.n_lane, self.system.points.area
         if len(area):
-            observe_joints(self.state.contact, area, n, time, self.joint_peaks, self.first_slip)
+            observe_joints(
+                self.state.contact, area, n, time, self.slip_before, self.elastic_range, self.joint_peaks, self.first_slip
+            )
         for lane in np.flatnonzero(record_holder):
             self.shape[:, lane] = self.state.motion.u[:, lane]
             self.shape_state[lane] = self.state.contact.state[lane]
@@ -230,6 +238,7 @@ class _Run:
             reason=tuple(self.reason[:n]),
             iterations=of_lanes(self.iterations, 0),
             residual=of_lanes(self.residual, 0),
+            source_test=of_lanes(self.source_test, 0),
             energy_error=of_lanes(self.account[0] / scale, 0),
             contact_drift=of_lanes(self.account[1] / scale, 0),
         )

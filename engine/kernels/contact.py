@@ -38,6 +38,7 @@ class Workspace(NamedTuple):
     product: np.ndarray  # (m,) G lambda
     swept: np.ndarray  # (m,) forces of the sweeps
     free: np.ndarray  # (m,) g_free of the lane at work
+    start: np.ndarray  # (m,) gaps of the last step
     proposal: np.ndarray  # (n_point,)
     tried: np.ndarray  # (n_point,)
 
@@ -49,6 +50,7 @@ def workspace(n_point: int, lanes: int) -> Workspace:
         np.zeros((lanes, m, m)),
         np.zeros((lanes, m), dtype=np.int64),
         np.full((lanes, n_point), -1, dtype=np.int8),
+        np.zeros(m),
         np.zeros(m),
         np.zeros(m),
         np.zeros(m),
@@ -256,3 +258,16 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
                 _sweep(G, g_free, k_n, k_s, mu, slip, work.swept, proposal)
             sweeps *= 2
     return -1, residual
+
+
+@kernel
+def source_test(g, g_free, work):
+    """The source's test in the joints' terms: norm of the correction that another iteration would make over that of the step.
+
+    Reads the gaps of the last step in work.start and G lambda in work.product; 0/0 at rest counts as met.
+    """
+    correction = step = 0.0
+    for i in range(g.shape[0]):
+        correction += (g[i] - g_free[i] + work.product[i]) ** 2
+        step += (g[i] - work.start[i]) ** 2
+    return 0.0 if step == 0.0 else np.sqrt(correction / step)

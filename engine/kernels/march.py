@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .contact import solve_lane
+from .contact import solve_lane, source_test
 from .jit import LANES, kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, slip_after
 
@@ -78,15 +78,16 @@ def history(rates, loads, ground, motion, rhs):
 
 
 @kernel
-def solve_joints(G, gap_free, law, n_lane, max_rounds, work, slip, found, rounds, residual):
+def solve_joints(G, gap_free, law, n_lane, max_rounds, work, slip, found, rounds, residual, source):
     """Joint solve of every lane, starting from the gaps, forces and states in `found`, which receives the solution.
 
-    G (1 or LANES, m, m) is the flexibility of all lanes or of each; gap_free (m, LANES); rounds, residual (LANES,). A lane
+    G (1 or LANES, m, m) is the flexibility of all lanes or of each; gap_free (m, LANES); rounds, residual, source (LANES,). A lane
     that did not converge has rounds -1.
     """
     for lane in range(n_lane):
         for i in range(gap_free.shape[0]):
             work.free[i] = gap_free[i, lane]
+            work.start[i] = found.gap[lane, i]
         rounds[lane], residual[lane] = solve_lane(
             G[lane if G.shape[0] > 1 else 0],
             work.free,
@@ -99,6 +100,7 @@ def solve_joints(G, gap_free, law, n_lane, max_rounds, work, slip, found, rounds
             work,
             max_rounds,
         )
+        source[lane] = source_test(found.gap[lane], work.free, work)
 
 
 @kernel
@@ -214,15 +216,19 @@ def observe(values, standing, peaks, watched, record_holder):
 
 
 @kernel
-def observe_joints(contact, area, n_lane, time, peaks, first_slip):
-    """Update peaks (4, LANES, n_point) of opening, slip, pressure, penetration, and the time at which each point first slips."""
+def observe_joints(contact, area, n_lane, time, slip_before, elastic_range, peaks, first_slip):
+    """Update peaks (4, LANES, n_point) of opening, slip, pressure, penetration, and when each closed point first slid (LANES, n_point).
+
+    A point has slid once its slip differs from that before the shaking by more than `elastic_range` (LANES, n_point), the
+    tangential displacement it could take without sliding then.
+    """
     for lane in range(n_lane):
         for p in range(area.shape[0]):
-            gap = contact.gap[lane, 2 * p]
+            gap, slip = contact.gap[lane, 2 * p], contact.slip[lane, p]
             peaks[0, lane, p] = max(peaks[0, lane, p], gap)
-            peaks[1, lane, p] = max(peaks[1, lane, p], abs(contact.slip[lane, p]))
+            peaks[1, lane, p] = max(peaks[1, lane, p], abs(slip))
             peaks[2, lane, p] = max(peaks[2, lane, p], -contact.force[lane, 2 * p] / area[p])
             peaks[3, lane, p] = max(peaks[3, lane, p], -gap)
-            sliding = contact.state[lane, p] == SLIP_FORWARD or contact.state[lane, p] == SLIP_BACKWARD
-            if sliding and np.isnan(first_slip[lane, p]):
+            closed = contact.state[lane, p] != OPEN
+            if closed and np.isnan(first_slip[lane, p]) and abs(slip - slip_before[lane, p]) > elastic_range[lane, p]:
                 first_slip[lane, p] = time

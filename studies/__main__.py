@@ -1,0 +1,236 @@
+"""The command line: run, check, plot, table, list, schema."""
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import xarray as xr
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from .advice import advise
+from .dataset import study_hash
+from .fields import catalogue
+from .messages import StudyError
+from .plan import Study, load_study, shipped_studies
+from .run import run_study, write_dataset
+from .table import failures, sentences
+from .table import table as table_of
+
+DONE, SOME_FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Studies of a buried box under water pressure and earthquake, with an interface that opens and slips.",
+)
+out, err = Console(highlight=False), Console(stderr=True, highlight=False)
+
+StudyName = Annotated[str, typer.Argument(help="a study file, or the name of a shipped study (see list)")]
+ResultFile = Annotated[Path, typer.Argument(help="a results file, as in results/p0.nc")]
+Workers = Annotated[int | None, typer.Option(min=1, help="processes; as many as cores by default")]
+
+
+def main() -> None:
+    """Entry point of `coralquake`."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    try:
+        app()
+    except KeyboardInterrupt:
+        err.print("Stopped; nothing was written.")
+        sys.exit(INTERRUPTED)
+
+
+def _refuse(lines: list[str]) -> typer.Exit:
+    for line in lines:
+        err.print(line, markup=False, soft_wrap=True)
+    return typer.Exit(WRONG_INPUT)
+
+
+def _load(source: str) -> Study:
+    try:
+        return load_study(source)
+    except StudyError as error:
+        raise _refuse(error.mistakes) from None
+
+
+def _open(path: Path) -> xr.Dataset:
+    if not path.is_file():
+        raise _refuse([f"{path}: there is no such results file; results are written by `coralquake run`"])
+    try:
+        ds = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError):
+        raise _refuse([f"{path}: is not a netCDF file that can be read"]) from None
+    if "study_hash" not in ds.attrs or "status" not in ds:
+        raise _refuse([f"{path}: was not written by coralquake"])
+    return ds
+
+
+@app.command("run")
+def run_command(
+    studies: Annotated[list[str] | None, typer.Argument(help="study files or names of shipped studies")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="run all shipped studies")] = False,
+    out_file: Annotated[Path | None, typer.Option("--out", help="results file; results/NAME.nc by default")] = None,
+    workers: Workers = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="compute anew what is there already")] = False,
+    figures: Annotated[bool, typer.Option("--plot", help="draw the figures too")] = False,
+) -> None:
+    """Run studies; write a netCDF file for each, and say what happened."""
+    names = list(shipped_studies()) if everything else studies or []
+    if not names:
+        raise _refuse(["run: name a study, or say --all (coralquake list shows what is shipped)"])
+    if out_file is not None and len(names) > 1:
+        raise _refuse([f"--out {out_file}: is for one study, {len(names)} are named"])
+    loaded = [_load(name) for name in names]
+    paths = [out_file or Path("results") / f"{study.name}.nc" for study in loaded]
+    _check_paths(paths)
+    rows, failed = [], False
+    for study, path in zip(loaded, paths, strict=True):
+        ds, seconds = _run_one(study, path, workers, fresh)
+        lost = failures(ds)
+        failed = failed or bool(lost)
+        rows.append((study.name, str(len(study.cases)), str(len(lost)), f"{seconds:.1f} s" if seconds else "there already", str(path)))
+        _tell(study, ds, lost)
+        if figures:
+            _draw(ds, path)
+    out.print(_summary(rows))
+    raise typer.Exit(SOME_FAILED if failed else DONE)
+
+
+def _check_paths(paths: list[Path]) -> None:
+    wrong = [f"{path}: is a folder, must be a file" for path in paths if path.is_dir()]
+    for folder in dict.fromkeys(path.parent for path in paths):
+        existing = next((p for p in (folder, *folder.parents) if p.exists()), Path())
+        if not existing.is_dir():
+            wrong.append(f"{existing}: is a file, must be a folder for the results")
+        elif not os.access(existing, os.W_OK):
+            wrong.append(f"{existing}: cannot be written to; choose another place with --out")
+    if wrong:
+        raise _refuse(wrong)
+
+
+def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tuple[xr.Dataset, float]:
+    """The dataset and the seconds it took, zero where the file was there already."""
+    if not fresh and path.is_file() and (ds := _finished(study, path)) is not None:
+        return ds, 0.0
+    start = time.perf_counter()
+    total = sum(round(spec.time.duration / spec.time.dt) for spec in study.cases)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(elapsed_when_finished=True))
+    with Progress(*columns, console=err) as bar:
+        task = bar.add_task(study.name, total=total)
+        ds = run_study(study, workers, lambda steps: bar.advance(task, steps))
+        bar.update(task, completed=total)
+    try:
+        write_dataset(ds, path)
+    except OSError as error:
+        raise _refuse([f"{path}: cannot be written: {error.strerror or error}"]) from None
+    return ds, time.perf_counter() - start
+
+
+def _finished(study: Study, path: Path) -> xr.Dataset | None:
+    """The dataset of this very study, where the file holds it."""
+    try:
+        ds = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError):
+        return None
+    return ds if ds.attrs.get("study_hash") == study_hash(study) else None
+
+
+def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
+    out.print(f"\n[bold]{study.title}[/bold]")
+    for sentence in sentences(ds):
+        out.print(sentence, markup=False)
+    for line in lost[:20]:
+        out.print(f"failed: {line}", markup=False)
+    if len(lost) > 20:
+        out.print(f"… and {len(lost) - 20} more; see status and reason in the file")
+
+
+def _summary(rows: list[tuple[str, ...]]) -> Table:
+    grid = Table(title="\nStudies", title_justify="left")
+    for name, justify in (("study", "left"), ("cases", "right"), ("failures", "right"), ("wall time", "right"), ("file", "left")):
+        grid.add_column(name, justify=justify, overflow="fold")  # type: ignore[arg-type]
+    for row in rows:
+        grid.add_row(*row)
+    return grid
+
+
+@app.command()
+def check(study: StudyName, workers: Workers = None) -> None:
+    """Validate a study and say what would run, its size and warnings; run nothing."""
+    loaded = _load(study)
+    advice = advise(loaded, workers or os.cpu_count() or 1)
+    out.print(f"[bold]{loaded.title}[/bold]")
+    width = max(len(name) for name, _ in advice.facts)
+    for name, value in advice.facts:
+        out.print(f"{name:<{width}}  {value}", markup=False, soft_wrap=True)
+    for warning in advice.warnings:
+        out.print(f"warning: {warning}", markup=False, soft_wrap=True)
+
+
+def _draw(ds: xr.Dataset, path: Path) -> None:
+    from .plots import draw_all  # matplotlib is slow to import, and most commands draw nothing
+
+    for figure in draw_all(ds, path):
+        out.print(f"figure  {figure}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def plot(results: ResultFile) -> None:
+    """Draw the figures of a results file beside it."""
+    _draw(_open(results), results)
+
+
+@app.command("table")
+def table_command(
+    results: ResultFile, csv: Annotated[Path | None, typer.Option(help="write the table to this file instead")] = None
+) -> None:
+    """Print one row a case: axes, status, peaks."""
+    frame = table_of(_open(results))
+    if csv is not None:
+        try:
+            frame.to_csv(csv, index=False)
+        except OSError as error:
+            raise _refuse([f"{csv}: cannot be written: {error.strerror}"]) from None
+        return
+    grid = Table(row_styles=["", "dim"])
+    for name in frame.columns:
+        grid.add_column(str(name), justify="right")
+    for row in frame.itertuples(index=False):
+        grid.add_row(*(f"{value:.4g}" if isinstance(value, float) else str(value) for value in row))
+    out.print(grid)
+
+
+@app.command("list")
+def list_command() -> None:
+    """Name the shipped studies."""
+    for name in shipped_studies():
+        study = load_study(name)
+        out.print(f"{name:<12}  {len(study.cases):>5} {'case ' if len(study.cases) == 1 else 'cases'}  {study.title}", markup=False)
+
+
+@app.command()
+def schema() -> None:
+    """List every field of a study file: unit, default, rule, meaning."""
+    out.print('title = "…", model = "coral-2010", then tables with these fields (layer.N is the N-th \\[\\[layer]] from the top):\n')
+    grid = Table(box=None, pad_edge=False)
+    for name in ("field", "unit", "default", "rule", "meaning"):
+        grid.add_column(name, overflow="fold")
+    for field in catalogue():
+        grid.add_row(field.name, field.unit, field.default, field.rule, field.meaning)
+    out.print(grid)
+    out.print(
+        "\n\\[sweep] makes a grid of any of these: p0 = \\[0, \"1 MPa\"], or { from, to, num, spacing = \"linear\" | \"log\" }.\n"
+        "A key is the dotted name, the same with underscores (damping_ratio), or the last part where it is unique (p0)."
+    )
+
+
+if __name__ == "__main__":
+    main()

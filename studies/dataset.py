@@ -1,0 +1,305 @@
+"""The dataset of a study: its schema, and the way from the batches' responses to it (DESIGN's table, CF-1.11, UGRID-1.0)."""
+
+import platform
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from engine import Mesh, Model, Response, Status
+from engine.simulate import OPENING, PENETRATION, PRESSURE, SLIP
+
+from .plan import Study
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable: dimensions after the study's axes, unit, long name, what it means."""
+
+    dims: tuple[str, ...]
+    unit: str
+    long_name: str
+    meaning: str = ""
+
+
+SCHEMA: dict[str, Variable] = {
+    "displacement": Variable(("time", "point", "component"), "m", "displacement relative to the base", "static state included"),
+    "stress": Variable(
+        ("time", "point", "stress_component"), "Pa", "stress", "tension positive, mean of the triangles at the point"
+    ),
+    "racking": Variable(("time",), "m", "racking of the box", "mean of roof corners minus mean of invert corners, horizontal"),
+    "racking_shear": Variable(("time",), "m", "racking of the box without its rigid rotation"),
+    "racking_free_field": Variable(
+        ("time",), "m", "racking of the free field", "layered column without the box, between the depths of roof and invert"
+    ),
+    "open_fraction": Variable(("time",), "1", "share of the joint length that is open", "carries no pressure"),
+    "slip_fraction": Variable(("time",), "1", "share of the joint length that slips"),
+    "max_opening": Variable(("joint",), "m", "largest opening of the joint"),
+    "max_slip": Variable(("joint",), "m", "largest slip of the joint"),
+    "max_pressure": Variable(("joint",), "Pa", "largest contact pressure of the joint"),
+    "first_slip": Variable(
+        ("joint",), "s", "time of the first slip", "beyond the elastic range before the shaking; NaN where it never slips"
+    ),
+    "gap_before_shaking": Variable(("joint",), "m", "gap before the shaking", "opening positive"),
+    "peak_displacement": Variable(("point", "component"), "m", "largest magnitude of displacement"),
+    "peak_displacement_dynamic": Variable(("point", "component"), "m", "the same minus the static state"),
+    "peak_stress": Variable(("point", "stress_component"), "Pa", "largest magnitude of stress"),
+    "peak_stress_dynamic": Variable(("point", "stress_component"), "Pa", "the same minus the static state"),
+    "peak_racking": Variable((), "m", "largest magnitude of racking"),
+    "peak_racking_dynamic": Variable((), "m", "the same minus the static state"),
+    "peak_racking_shear": Variable((), "m", "largest magnitude of racking without the rigid rotation"),
+    "peak_racking_free_field": Variable((), "m", "largest magnitude of the free field's racking"),
+    "shape": Variable(("node", "component"), "m", "displacement of all nodes at the moment of the largest racking"),
+    "shape_time": Variable((), "s", "moment of the largest racking"),
+    "shape_state": Variable(("joint",), "1", "joint states at that moment", "0 open, 1 sticking, 2 and 3 slipping"),
+    "status": Variable((), "1", "how the case ended", ", ".join(f"{s.value} {s.name.lower().replace('_', ' ')}" for s in Status)),
+    "reason": Variable((), "", "why the case failed"),
+    "iterations": Variable((), "1", "largest number of direct joint solves in a step"),
+    "residual": Variable((), "1", "largest relative residual of a joint solve"),
+    "source_test": Variable((), "1", "largest value of the source's convergence test", "correction over step, in the joints"),
+    "energy_error": Variable((), "1", "largest imbalance of energy", "over the largest sum of absolute terms"),
+    "contact_drift": Variable((), "1", "joint work that is neither stored nor dissipated", "shrinks with the time step"),
+    "penetration": Variable((), "m", "largest penetration of the penalty joints"),
+    "frequency": Variable(("mode",), "Hz", "natural frequencies with all joints closed and sticking"),
+    "base_acceleration": Variable(("time", "component"), "m/s2", "acceleration of the rigid base"),
+    "closed_before_shaking": Variable((), "1", "share of the joint length that carries pressure before the shaking"),
+    "uplift_over_weight": Variable((), "1", "net uplift of the water pressure over the box's weight", "9.81 m/s² or the study's own"),
+}
+
+COORDINATES: dict[str, Variable] = {
+    "time": Variable(("time",), "s", "time from the start of the motion"),
+    "point_x": Variable(("point",), "m", "x of the point"),
+    "point_y": Variable(("point",), "m", "y of the point, the ground surface is 0"),
+    "joint_x": Variable(("joint",), "m", "x of the joint point"),
+    "joint_y": Variable(("joint",), "m", "y of the joint point"),
+    "joint_arc": Variable(("joint",), "m", "arc length round the box", "counter-clockwise from the lower left corner"),
+    "joint_length": Variable(("joint",), "m", "tributary length of the joint point"),
+    "joint_side": Variable(("joint",), "", "side of the box: floor, right wall, roof, left wall"),
+}
+
+
+def build_dataset(study: Study, models: Sequence[Model], parts: Sequence[dict[str, np.ndarray]], owner: np.ndarray) -> xr.Dataset:
+    """One dataset of a whole study.
+
+    models : one a batch; parts : `case_arrays` of every batch, case first; owner : (n_case, 2) batch and lane of each case
+    """
+    grid = _common_time(parts)
+    ds = xr.Dataset()
+    for name, variable in SCHEMA.items():
+        ds[name] = _variable(name, variable, study, parts, owner, grid)
+    for axis in study.axes:
+        ds = ds.assign_coords({axis.name: (axis.name, list(axis.values), _attributes(axis.field.unit or "1", axis.field.meaning))})
+    ds = ds.assign_coords(time=("time", grid, _attributes("s", COORDINATES["time"].long_name)))
+    model = models[0]
+    ds = ds.assign_coords(
+        point=("point", list(model.system.mesh.probes)),
+        component=("component", ["x", "y"]),
+        stress_component=("stress_component", ["xx", "yy", "xy"]),
+        mode=("mode", np.arange(1, len(model.frequencies) + 1)),
+    )
+    ds = _with_joint(ds, models)
+    ds = _with_mesh(ds, models[0], len({id(model.system) for model in models}) == 1)
+    ds.attrs = _provenance(study)
+    return ds
+
+
+def _attributes(unit: str, long_name: str, meaning: str = "") -> dict[str, str]:
+    found = {"units": unit, "long_name": long_name, "comment": meaning}
+    return {key: value for key, value in found.items() if value}
+
+
+def _common_time(parts: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
+    """The grid of all histories: as long as the longest, as coarse as the coarsest."""
+    times = [part["time"] for part in parts]
+    if all(len(t) == len(times[0]) and np.array_equal(t, times[0]) for t in times):
+        return times[0]
+    step = max(t[1] - t[0] for t in times if len(t) > 1)
+    return np.arange(round(max(t[-1] for t in times) / step) + 1) * step
+
+
+def _variable(
+    name: str, variable: Variable, study: Study, parts: Sequence[dict[str, np.ndarray]], owner: np.ndarray, grid: np.ndarray
+) -> xr.Variable:
+    """One variable of all cases, shaped by the study's axes; histories on the grid, shorter arrays padded with NaN."""
+    values = [parts[batch][name][lane] for batch, lane in owner]
+    if variable.dims[:1] == ("time",):
+        values = [_on_grid(v, parts[batch]["time"], grid) for v, (batch, _) in zip(values, owner, strict=True)]
+    if name == "reason":
+        array = np.array([str(v) for v in values], dtype=object)
+    elif name == "status":
+        array = np.array(values, dtype=np.int32)
+    else:
+        array = _stacked([np.asarray(v, dtype=float) for v in values])
+    shaped = array.reshape(study.shape + array.shape[1:])
+    dims = (*(axis.name for axis in study.axes), *variable.dims)
+    return xr.Variable(dims, shaped, _attributes(variable.unit, variable.long_name, variable.meaning))
+
+
+def _on_grid(values: np.ndarray, time: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    if len(time) == len(grid) and np.array_equal(time, grid):
+        return values
+    flat = values.reshape(len(time), -1)
+    columns = [np.interp(grid, time, column, right=np.nan) for column in flat.T]
+    return np.array(columns).T.reshape(len(grid), *values.shape[1:])
+
+
+def _stacked(values: list[np.ndarray]) -> np.ndarray:
+    """Arrays one after the other, padded with NaN where they are shorter than the longest."""
+    shape = tuple(np.max([v.shape for v in values], axis=0)) if values[0].ndim else ()
+    result = np.full((len(values), *shape), np.nan)
+    for i, value in enumerate(values):
+        result[(i, *(slice(n) for n in value.shape))] = value
+    return result
+
+
+def case_arrays(model: Model, response: Response, extra: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Everything the schema asks of a batch, case first, and `time`. `extra` holds what the response does not know."""
+    r, recorder = response, response.recorder
+    length = model.system.points.length
+    closed = 1 - (r.static_open * length).sum(axis=1) / max(length.sum(), 1e-300)
+    n = len(r.status)
+    return {
+        "time": r.time,
+        "displacement": recorder.displacement(r.values),
+        "stress": recorder.stress(r.values),
+        "racking": r.values[..., recorder.racking],
+        "racking_shear": r.values[..., recorder.racking + 1],
+        "open_fraction": r.fractions[..., 0],
+        "slip_fraction": r.fractions[..., 1],
+        "max_opening": r.joint_peaks[:, OPENING],
+        "max_slip": r.joint_peaks[:, SLIP],
+        "max_pressure": r.joint_peaks[:, PRESSURE],
+        "first_slip": r.first_slip,
+        "gap_before_shaking": r.static_gap,
+        "peak_displacement": recorder.displacement(r.peaks[:, 0]),
+        "peak_displacement_dynamic": recorder.displacement(r.peaks[:, 1]),
+        "peak_stress": recorder.stress(r.peaks[:, 0]),
+        "peak_stress_dynamic": recorder.stress(r.peaks[:, 1]),
+        "peak_racking": r.peaks[:, 0, recorder.racking],
+        "peak_racking_dynamic": r.peaks[:, 1, recorder.racking],
+        "peak_racking_shear": r.peaks[:, 0, recorder.racking + 1],
+        "shape": r.shape,
+        "shape_time": r.shape_time,
+        "shape_state": r.shape_state,
+        "status": r.status,
+        "reason": np.array(r.reason, dtype=object),
+        "iterations": r.iterations,
+        "residual": r.residual,
+        "source_test": r.source_test,
+        "energy_error": r.energy_error,
+        "contact_drift": r.contact_drift,
+        "penetration": r.joint_peaks[:, PENETRATION].max(axis=1, initial=0.0),
+        "frequency": np.repeat(model.frequencies[None], n, axis=0),
+        "closed_before_shaking": closed,
+        **extra,
+    }
+
+
+def joint_sides(model: Model) -> list[str]:
+    """Side of the box on which each joint point lies, by its normal into the structure."""
+    names = {(0, 1): "floor", (-1, 0): "right wall", (0, -1): "roof", (1, 0): "left wall"}
+    return [names.get((round(x), round(y)), "side") for x, y in model.system.points.normal]
+
+
+def _with_joint(ds: xr.Dataset, models: Sequence[Model]) -> xr.Dataset:
+    """Coordinates of the joint points; of the model with the most points where the cases differ."""
+    model = max(models, key=lambda m: len(m.system.points))
+    points, probes = model.system.points, model.system.mesh.probes.values()
+    values: dict[str, Any] = {
+        "point_x": [probe.x for probe in probes],
+        "point_y": [probe.y for probe in probes],
+        "joint_x": points.place[:, 0],
+        "joint_y": points.place[:, 1],
+        "joint_arc": points.arc,
+        "joint_length": points.length,
+        "joint_side": joint_sides(model),
+    }
+    described = {n: (COORDINATES[n].dims, v, _attributes(*_facts(COORDINATES[n]))) for n, v in values.items()}
+    return ds.assign_coords(described)
+
+
+def _facts(variable: Variable) -> tuple[str, str, str]:
+    return variable.unit, variable.long_name, variable.meaning
+
+
+def _with_mesh(ds: xr.Dataset, model: Model, only_one: bool) -> xr.Dataset:
+    """UGRID topology of the first mesh, with the layer of every triangle and the nodes of every joint."""
+    mesh: Mesh = model.system.mesh
+    topology = {
+        "cf_role": "mesh_topology",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "mesh_node_x mesh_node_y",
+        "face_node_connectivity": "mesh_face_nodes",
+        "face_dimension": "face",
+        "long_name": "mesh of the first case" if not only_one else "mesh of all cases",
+    }
+    ds["mesh"] = xr.Variable((), np.int32(0), topology)
+    ds["mesh_face_nodes"] = xr.Variable(
+        ("face", "corner"), mesh.triangles.astype(np.int32), {"cf_role": "face_node_connectivity", "start_index": np.int32(0)}
+    )
+    n_layer = len(model.spec.layer)
+    comment = f"0 to {n_layer - 1}: layers from the top; {n_layer}: structure"
+    ds["mesh_layer"] = xr.Variable(("face",), mesh.material.astype(np.int32), {"long_name": "layer of the triangle", "comment": comment})
+    ds["joint_nodes"] = xr.Variable(
+        ("joint", "joint_corner"), _joint_nodes(model), {"long_name": "nodes of the joint element: 1-2 ground, 3-4 structure"}
+    )
+    for i, name in enumerate(("mesh_node_x", "mesh_node_y")):
+        ds = ds.assign_coords({name: ("node", mesh.nodes[:, i], {"units": "m", "long_name": f"{'xy'[i]} of the node"})})
+    return ds
+
+
+def _joint_nodes(model: Model) -> np.ndarray:
+    return model.system.points.nodes.astype(np.int32)
+
+
+def _provenance(study: Study) -> dict[str, str]:
+    packages = ("coralquake", "numpy", "numba", "scipy", "xarray", "netCDF4", "pandas")
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    records = ", ".join(f"{name} {sha256(m.acceleration.tobytes()).hexdigest()}" for name, m in study.motions.items())
+    return {
+        "Conventions": "CF-1.11 UGRID-1.0",
+        "title": study.title,
+        "study_name": study.name,
+        "study": study.text,
+        "study_hash": study_hash(study),
+        "records_sha256": records or "none",
+        "package_versions": ", ".join(f"{package} {version(package)}" for package in packages),
+        "commit": _commit(),
+        "platform": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+        "created": now,
+        "history": f"{now} computed by coralquake {version('coralquake')}",
+    }
+
+
+def _commit() -> str:
+    """Commit of the checkout that the program runs from, 'unknown' elsewhere."""
+    folder = Path(__file__).parent
+    try:
+        answer = subprocess.run(
+            ["git", "-C", str(folder), "rev-parse", "HEAD"], capture_output=True, text=True, timeout=5, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return answer.stdout.strip()
+
+
+def study_hash(study: Study) -> str:
+    """Digest of all that decides the result: cases, records, the engine's sources, versions of the numerical packages."""
+    digest = sha256()
+    for spec in study.cases:
+        digest.update(spec.model_dump_json().encode())
+    for name, motion in study.motions.items():
+        digest.update(f"{name} {motion.dt!r}".encode() + motion.acceleration.tobytes())
+    digest.update(repr([(axis.name, axis.values) for axis in study.axes]).encode() + study.title.encode())
+    for folder in (Path(__file__).parent, Path(__file__).parent.parent / "engine"):
+        for source in sorted(folder.rglob("*.py")):
+            digest.update(source.read_bytes())
+    digest.update(" ".join(version(package) for package in ("numpy", "scipy", "numba")).encode())
+    return digest.hexdigest()

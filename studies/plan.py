@@ -1,0 +1,338 @@
+"""From a study file to cases, and from cases to batches of lanes: TOML -> Study -> cases -> batches."""
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from engine import LANES, PRESETS, GroundMotion, MotionError, Spec, base_motion, read_at2
+from engine.units import in_si
+
+from .fields import Field, catalogue, nearest, resolve
+from .messages import StudyError, explain, shown
+
+SHIPPED = Path(__file__).parent
+MOTIONS = SHIPPED / "motions"
+MOST_CASES = 1_000_000
+MOST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept field: its short name, the field, its values in SI."""
+
+    name: str
+    field: Field
+    values: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Cases (positions in Study.cases) that march together: at most LANES, of one model and time step."""
+
+    cases: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A validated study: `cases` in the order of the axes (the last one runs fastest), `motions` by the name the study gives."""
+
+    name: str
+    title: str
+    text: str
+    axes: tuple[Axis, ...]
+    cases: tuple[Spec, ...]
+    motions: Mapping[str, GroundMotion]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values along each axis."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    def label(self, case: int) -> str:
+        """The case in words: 'p0 = 2e+06 Pa'."""
+        index = np.unravel_index(case, self.shape) if self.axes else ()
+        parts = [
+            f"{axis.name} = {shown(axis.values[i])} {axis.field.unit}".strip() for axis, i in zip(self.axes, index, strict=True)
+        ]
+        return ", ".join(parts) or "the only case"
+
+    def ground(self, case: int) -> np.ndarray:
+        """Base acceleration (n_step + 1, 2) [m/s²] of a case."""
+        spec = self.cases[case]
+        records = [self.motions.get(name) for name in (spec.motion.record, spec.motion.vertical_record)]
+        return base_motion(spec.motion, spec.time, *records)
+
+    @cached_property
+    def batches(self) -> tuple[Batch, ...]:
+        """Cases grouped by what they share; it depends on the study alone."""
+        groups: dict[str, list[int]] = {}
+        for i, spec in enumerate(self.cases):
+            groups.setdefault(_shared(spec), []).append(i)
+        return tuple(Batch(tuple(group[i : i + LANES])) for group in groups.values() for i in range(0, len(group), LANES))
+
+
+def _shared(spec: Spec) -> str:
+    """What cases of one batch have in common: all but pressure, motion, gravity and friction, which are a lane's own."""
+    shared = spec.model_dump(exclude={"pressure", "motion", "gravity"})
+    for layer in shared["layer"]:
+        del layer["friction"]
+    return json.dumps(shared, sort_keys=True)
+
+
+def shipped_studies() -> dict[str, Path]:
+    """The named studies, by name."""
+    return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
+
+
+def load_study(source: str | Path) -> Study:
+    """The study of a file or of a shipped name; StudyError with one line for every mistake."""
+    path = _find(source)
+    text = _read(path)
+    try:
+        table = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        reason = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "is nested too deeply"
+        raise StudyError([f"{path.name}: is not valid TOML: {reason}"]) from None
+    return make_study(table, path.stem, text, path.parent, path.name)
+
+
+def _find(source: str | Path) -> Path:
+    path = Path(source)
+    if path.exists():
+        return path
+    shipped = shipped_studies()
+    if str(source) in shipped:
+        return shipped[str(source)]
+    known = ", ".join(shipped)
+    raise StudyError([f"{shown(str(source))}: there is no such file, nor a shipped study of that name ({known})"])
+
+
+def _read(path: Path) -> str:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise StudyError([f"{path.name}: is larger than {MOST_BYTES // 1_000_000} MB; is it a study file?"])
+        return path.read_text(encoding="utf-8-sig")
+    except IsADirectoryError:
+        raise StudyError([f"{path.name}: is a folder; name the study file in it"]) from None
+    except UnicodeDecodeError as error:
+        raise StudyError([f"{path.name}: is not UTF-8 text (byte {error.start}); save it as UTF-8"]) from None
+    except OSError as error:
+        raise StudyError([f"{path.name}: cannot be read: {error.strerror}"]) from None
+
+
+def make_study(table: dict[str, Any], name: str = "study", text: str = "", folder: Path | None = None, file: str = "") -> Study:
+    """The study that a table describes, as read from TOML; StudyError with one line for every mistake, led by `file`."""
+    mistakes: list[str] = []
+    title = table.get("title", name)
+    if not isinstance(title, str):
+        mistakes.append(f"title = {shown(title)}: must be text in quotes")
+    base = _base(table, mistakes)
+    axes = _axes(table.get("sweep", {}), mistakes)
+    cases = _cases(base, axes, mistakes) if base is not None else []
+    motions = _motions(_records(table, base, cases), folder or Path(), mistakes)
+    if mistakes:
+        lead = f"{file or name}: "
+        raise StudyError([lead + line for line in dict.fromkeys(mistakes)])
+    study = Study(name, title, text, tuple(axes), tuple(cases), motions)
+    _check_motions(study, file or name)
+    return study
+
+
+def _base(table: dict[str, Any], mistakes: list[str]) -> Spec | None:
+    """The model without its sweep."""
+    model = table.get("model", "coral-2010")
+    if not isinstance(model, str) or model not in PRESETS:
+        mistakes.append(f"model = {shown(model)}: is not a model; must be {' or '.join(PRESETS)}")
+        model = "coral-2010"
+    given = {key: value for key, value in table.items() if key not in ("title", "model", "sweep")}
+    for key in [key for key in given if key not in Spec.model_fields]:
+        known = [*Spec.model_fields, "title", "model", "sweep"]
+        hint = nearest(key, known) or nearest(key, [field.name for field in catalogue()])
+        mistakes.append(f"{key} = {shown(given.pop(key))}: is not a table of a study{hint}")
+    try:
+        return Spec.model_validate(_merged(PRESETS[model], given), context={"from_file": True})
+    except ValidationError as error:
+        mistakes.extend(explain(error))
+        return None
+
+
+def _merged(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    both = {**preset, **given}
+    for key in preset.keys() & given.keys():
+        if isinstance(preset[key], dict) and isinstance(given[key], dict):
+            both[key] = {**preset[key], **given[key]}
+    return both
+
+
+def _axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
+    if not isinstance(sweep, dict):
+        mistakes.append(f"sweep = {shown(sweep)}: must be a table")
+        return []
+    axes: list[Axis] = []
+    for name, written in _flat(sweep).items():
+        field = resolve(name)
+        if field is None:
+            known = [other.name for other in catalogue()]
+            mistakes.append(f"sweep.{name}: is not a field{nearest(name, known)}")
+        elif any(axis.field.name == field.name for axis in axes):
+            mistakes.append(f"sweep.{name}: {field.name} is swept already")
+        else:
+            values = _values(f"sweep.{name}", written, field, mistakes)
+            axes.append(Axis(name.replace(".", "_"), field, tuple(values)))
+    if prod(len(axis.values) for axis in axes) > MOST_CASES:
+        mistakes.append(f"sweep: makes {prod(len(a.values) for a in axes):,} cases; must be at most {MOST_CASES:,}")
+        return []
+    return axes
+
+
+_RANGE = {"from", "to", "num", "spacing"}
+
+
+def _flat(sweep: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Dotted keys of nested tables; a table with keys of a range is a value."""
+    flat: dict[str, Any] = {}
+    for key, value in sweep.items():
+        if isinstance(value, dict) and value and not _RANGE & value.keys():
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[prefix + key] = value
+    return flat
+
+
+def _values(name: str, written: Any, field: Field, mistakes: list[str]) -> list[Any]:
+    """Values of an axis in SI: a list of values and ranges, or one range."""
+    entries = written if isinstance(written, list) else [written]
+    if not isinstance(written, (list, dict)) or not entries:
+        mistakes.append(f"{name} = {shown(written)}: must be a list of at least one value, or {{ from, to, num, spacing }}")
+        return []
+    values: list[Any] = []
+    for entry in entries:
+        values += _range(name, entry, field, mistakes) if isinstance(entry, dict) else _single(name, entry, field, mistakes)
+    for i, value in enumerate(values):
+        if value in values[:i]:
+            mistakes.append(f"{name}: holds {shown(value)} {field.unit} twice".replace("  ", " "))
+            break
+    return values
+
+
+def _single(name: str, entry: Any, field: Field, mistakes: list[str]) -> list[Any]:
+    if isinstance(entry, (list, dict)):
+        mistakes.append(f"{name} = {shown(entry)}: must be a value or a range")
+        return []
+    if not field.unit:
+        return [entry]
+    try:
+        return [in_si(entry, field.unit, unit_required=True)]
+    except ValueError as error:
+        mistakes.append(f"{name} = {shown(entry)}: {error}")
+        return []
+
+
+def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) -> list[float]:
+    """{ from, to, num, spacing = "linear" or "log" } as values."""
+    before = len(mistakes)
+    for key in sorted(entry.keys() - _RANGE):
+        mistakes.append(f"{name}.{key}: is not part of a range; must be from, to, num or spacing")
+    ends = []
+    for key in ("from", "to"):
+        if key not in entry:
+            mistakes.append(f"{name}.{key}: is missing")
+            continue
+        try:
+            ends.append(in_si(entry[key], field.unit or "1", unit_required=True))
+        except ValueError as error:
+            mistakes.append(f"{name}.{key} = {shown(entry[key])}: {error}")
+    num, spacing = entry.get("num"), entry.get("spacing", "linear")
+    if isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_CASES:
+        mistakes.append(f"{name}.num = {shown(num)}: must be a whole number from 2 to {MOST_CASES:,}")
+    if spacing not in ("linear", "log"):
+        mistakes.append(f'{name}.spacing = {shown(spacing)}: must be "linear" or "log"')
+    elif spacing == "log" and len(ends) == 2 and not (ends[0] > 0 and ends[1] > 0):
+        mistakes.append(f"{name}: a logarithmic range must lie above zero; put the zero beside it, as in [0, {{ from, … }}]")
+    if len(mistakes) > before:
+        return []
+    make = np.geomspace if spacing == "log" else np.linspace
+    return [float(value) for value in make(ends[0], ends[1], num)]
+
+
+def _cases(base: Spec, axes: list[Axis], mistakes: list[str]) -> list[Spec]:
+    """All combinations of the axes' values; mistakes of single values are found on each axis alone first."""
+    before = len(mistakes)
+    if not axes:
+        return [base]
+    for axis in axes:
+        for value in axis.values:
+            _case(base, [(axis, value)], mistakes)
+    if len(mistakes) > before or not all(axis.values for axis in axes):
+        return []
+    found = [_case(base, list(zip(axes, values, strict=True)), mistakes) for values in product(*(a.values for a in axes))]
+    return [case for case in found if case is not None]
+
+
+def _case(base: Spec, settings: list[tuple[Axis, Any]], mistakes: list[str]) -> Spec | None:
+    table = base.model_dump()
+    for axis, value in settings:
+        *path, last = axis.field.path
+        part: Any = table
+        for key in path:
+            index = int(key) - 1 if isinstance(part, (list, tuple)) else key
+            if isinstance(index, int) and not 0 <= index < len(part):
+                mistakes.append(f"sweep.{axis.field.name}: there are {len(part)} layers")
+                return None
+            part = part[index]
+        part[last] = value
+    try:
+        return Spec.model_validate(table)
+    except ValidationError as error:
+        mistakes.extend(f"sweep.{settings[0][0].name}: {line}" if len(settings) == 1 else f"sweep: {line}" for line in explain(error))
+        return None
+
+
+def _records(table: dict[str, Any], base: Spec | None, cases: list[Spec]) -> dict[str, str]:
+    """Every record the study names, with the field that names it; also where the rest of the study is wrong."""
+    named = [spec.motion.model_dump() for spec in cases or ([base] if base else [])]
+    if not named and isinstance(table.get("motion"), dict):
+        named = [table["motion"]]
+    fields = ("record", "vertical_record")
+    return {m[f]: f for m in named for f in fields if isinstance(m.get(f), str) and m[f] != "none"}
+
+
+def _motions(records: dict[str, str], folder: Path, mistakes: list[str]) -> dict[str, GroundMotion]:
+    """The records by name, each read once: sought beside the study, then among those shipped."""
+    motions: dict[str, GroundMotion] = {}
+    for name, field in records.items():
+        path = next((root / name for root in (folder, MOTIONS, SHIPPED) if _is_file(root / name)), None)
+        try:
+            if path is None:
+                shipped = ", ".join(sorted(p.name for p in MOTIONS.glob("*.AT2")))
+                raise MotionError(f"no such file beside the study, nor among those shipped ({shipped})")
+            motions[name] = read_at2(path)
+        except MotionError as error:
+            mistakes.append(f"motion.{field} = {shown(name)}: {error}")
+    return motions
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _check_motions(study: Study, file: str) -> None:
+    """Prepare the motion of each kind of case once, so that a record that cannot be scaled is found before anything runs."""
+    seen = {(spec.motion, spec.time): i for i, spec in enumerate(study.cases)}
+    try:
+        for case in seen.values():
+            study.ground(case)
+    except MotionError as error:
+        raise StudyError([f"{file}: motion: {error}"]) from None

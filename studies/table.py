@@ -1,0 +1,129 @@
+"""A dataset as a table, one row a case, and as three sentences."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from engine import Status
+
+
+def axes_of(ds: xr.Dataset) -> list[str]:
+    """Names of the swept axes, in the study's order."""
+    return [str(dim) for dim in ds["status"].dims]
+
+
+def cases_of(ds: xr.Dataset) -> xr.Dataset:
+    """The dataset with its axes stacked to one dimension `case`."""
+    axes = axes_of(ds)
+    stacked = ds.stack(case=axes, create_index=False) if axes else ds.expand_dims("case")
+    return stacked.transpose("case", ...)
+
+
+def table(ds: xr.Dataset) -> pd.DataFrame:
+    """One row a case: the axes, how it ended, the peaks a designer asks for first. SI units, named in the columns."""
+    cases = cases_of(ds)
+    columns = {name: cases[name].values for name in axes_of(ds)}
+    columns |= {
+        "status": cases["status"].values,
+        "closed before shaking [1]": cases["closed_before_shaking"].values,
+        "peak u_x at A [m]": cases["peak_displacement"].sel(point="A", component="x").values,
+        "peak racking [m]": cases["peak_racking"].values,
+        "racking over free field [1]": _ratio(cases),
+        "max opening [m]": cases["max_opening"].max("joint").values,
+        "max slip [m]": cases["max_slip"].max("joint").values,
+        "peak stress xx at C [Pa]": cases["peak_stress"].sel(point="C", stress_component="xx").values,
+        "energy error [1]": cases["energy_error"].values,
+    }
+    return pd.DataFrame(columns)
+
+
+def _ratio(cases: xr.Dataset) -> np.ndarray:
+    """Peak racking over the free field's, NaN where that is zero."""
+    free = cases["peak_racking_free_field"].values
+    return cases["peak_racking"].values / np.where(free > 0, free, np.nan)
+
+
+def failures(ds: xr.Dataset) -> list[str]:
+    """One line for every case that failed: where in the sweep, and why."""
+    cases = cases_of(ds)
+    axes = axes_of(ds)
+    lines = []
+    for i in np.flatnonzero(cases["status"].values >= Status.NOT_CONVERGED):
+        place = ", ".join(f"{axis} = {in_words(cases[axis].values[i], cases[axis].attrs['units'])}" for axis in axes)
+        lines.append(f"{place or 'the case'}: {cases['reason'].values[i]}")
+    return lines
+
+
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
+
+
+def in_words(value: object, unit: str) -> str:
+    """A value with its unit, as a reader would write it: 2 MPa, 0.05."""
+    if isinstance(value, (str, bool, np.str_, np.bool_)):
+        return str(value)
+    number = float(value)  # type: ignore[arg-type]
+    unit = unit.replace("**", "")
+    if unit in ("Pa", "Hz"):
+        for factor, prefix in _PREFIXES:
+            if abs(number) >= 0.01 * factor and abs(number) >= 1e3:
+                return f"{number / factor:.3g} {prefix}{unit}"
+    return f"{number:.3g}" if unit in ("", "1") else f"{number:.3g} {unit}"
+
+
+def sentences(ds: xr.Dataset) -> list[str]:
+    """Three sentences from the data: the state before the shaking, the first slip, the racking."""
+    done = cases_of(ds)
+    done = done.isel(case=np.flatnonzero(done["status"].values <= Status.SUBSTEPS))
+    if done.sizes["case"] == 0:
+        return ["No case of this study has come to its end."]
+    return [_before_shaking(done, axes_of(ds)), _first_slip(done, axes_of(ds)), _racking(done, axes_of(ds))]
+
+
+def _at(cases: xr.Dataset, axes: list[str], i: int) -> str:
+    """' at p0 = 2 MPa', or nothing where there is but one case."""
+    if not axes or cases.sizes["case"] == 1:
+        return ""
+    return " at " + ", ".join(f"{axis} = {in_words(cases[axis].values[i], cases[axis].attrs['units'])}" for axis in axes)
+
+
+def _before_shaking(cases: xr.Dataset, axes: list[str]) -> str:
+    closed = 100 * cases["closed_before_shaking"].values
+    floor = cases["gap_before_shaking"].values[:, cases["joint_side"].values == "floor"]
+    lifted = (floor > 0).all(axis=1)
+    if len(closed) == 1:
+        return f"Before shaking {closed[0]:.0f} % of the joint is closed and the floor {'has lifted' if lifted[0] else 'bears'}."
+    least, most = int(np.argmin(closed)), int(np.argmax(closed))
+    spread = f"{closed[most]:.0f} % of the joint is closed{_at(cases, axes, most)}"
+    if closed[least] < closed[most]:
+        spread += f" and {closed[least]:.0f} %{_at(cases, axes, least)}"
+    if not lifted.any():
+        return f"Before shaking {spread}; the floor bears in every case."
+    if lifted.all():
+        return f"Before shaking {spread}; the floor has lifted in every case."
+    if len(axes) == 1 and (np.diff(lifted.astype(int)) >= 0).all():
+        return f"Before shaking {spread}; the floor has lifted from {_at(cases, axes, int(np.argmax(lifted)))[4:]} on."
+    return f"Before shaking {spread}; the floor has lifted in {lifted.sum()} of {len(lifted)} cases."
+
+
+def _first_slip(cases: xr.Dataset, axes: list[str]) -> str:
+    times = cases["first_slip"].values
+    if np.isnan(times).all():
+        return "The joint never slips while it shakes."
+    first = np.where(np.isnan(times), np.inf, times)
+    case, joint = np.unravel_index(int(np.argmin(first)), first.shape)
+    side = cases["joint_side"].values[joint]
+    where = _at(cases, axes, int(case))
+    slipping = int(np.isfinite(first).any(axis=1).sum())
+    if len(first) == 1:
+        return f"It first slips at {first[case, joint]:.2f} s on the {side}."
+    return f"The first slip comes at {first[case, joint]:.2f} s on the {side}{where}; {slipping} of {len(first)} cases slip."
+
+
+def _racking(cases: xr.Dataset, axes: list[str]) -> str:
+    ratio = _ratio(cases)
+    if np.isnan(ratio).all():
+        return "There is no horizontal motion that would rack the free field."
+    low, high = int(np.nanargmin(ratio)), int(np.nanargmax(ratio))
+    if len(ratio) == 1:
+        return f"Peak racking is {ratio[0]:.2g} × the free field's."
+    return f"Peak racking is {ratio[low]:.2g}{_at(cases, axes, low)} to {ratio[high]:.2g} × the free field's{_at(cases, axes, high)}."
