@@ -139,9 +139,9 @@ class MeshOptions(Section):
     roof_elements: Annotated[int, Field(ge=2, le=200, multiple_of=2, description="elements along the clear width")] = 8
     side_elements: Annotated[int, Field(ge=2, le=200, multiple_of=2, description="elements along the clear height")] = 6
     first: Quantity("m", "size of the ground elements at the box", gt=0) = 0.5
-    growth: Quantity("1", "growth of their size, an element to the next, away from it", ge=1, le=4) = 1.25
-    largest_width: Quantity("m", "largest width of a ground element", gt=0) = 1.5
-    largest_height: Quantity("m", "largest height of a ground element", gt=0) = 0.8
+    growth: Quantity("1", "growth of their size, an element to the next, away from it", ge=1, le=4) = 1.2
+    largest_width: Quantity("m", "largest width of a ground element", gt=0) = 1.0
+    largest_height: Quantity("m", "largest height of a ground element", gt=0) = 0.5
     mass: Annotated[Literal["consistent", "lumped"], Field(description="mass matrix")] = "consistent"
 
 
@@ -177,7 +177,7 @@ class Gravity(Section):
 class Output(Section):
     """What is kept."""
 
-    every: Annotated[int, Field(ge=1, le=100_000, description="histories keep every so many steps; peaks see all")] = 4
+    every: Annotated[int, Field(ge=1, le=100_000, description="histories keep every so many steps; peaks see all")] = 2
     points: Annotated[
         dict[str, tuple[Quantity("m", "x"), Quantity("m", "y")]],
         Field(description="further points: name = [x, y], x from the middle of the domain, y up from the surface"),

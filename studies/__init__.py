@@ -5,4 +5,15 @@ from .plan import Study, load_study, make_study, shipped_studies
 from .run import run, run_study, write_dataset
 from .table import sentences, table
 
-__all__ = ["Study", "StudyError", "load_study", "make_study", "run", "run_study", "sentences", "shipped_studies", "table", "write_dataset"]
+__all__ = [
+    "Study",
+    "StudyError",
+    "load_study",
+    "make_study",
+    "run",
+    "run_study",
+    "sentences",
+    "shipped_studies",
+    "table",
+    "write_dataset",
+]

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,8 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
+
+from engine import PRESETS
 
 from .advice import advise
 from .dataset import study_hash
@@ -96,7 +99,9 @@ def run_command(
         ds, seconds = _run_one(study, path, workers, fresh)
         lost = failures(ds)
         failed = failed or bool(lost)
-        rows.append((study.name, str(len(study.cases)), str(len(lost)), f"{seconds:.1f} s" if seconds else "there already", str(path)))
+        rows.append(
+            (study.name, str(len(study.cases)), str(len(lost)), f"{seconds:.1f} s" if seconds else "there already", str(path))
+        )
         _tell(study, ds, lost)
         if figures:
             _draw(ds, path)
@@ -122,7 +127,12 @@ def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tupl
         return ds, 0.0
     start = time.perf_counter()
     total = sum(round(spec.time.duration / spec.time.dt) for spec in study.cases)
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(elapsed_when_finished=True))
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
     with Progress(*columns, console=err) as bar:
         task = bar.add_task(study.name, total=total)
         ds = run_study(study, workers, lambda steps: bar.advance(task, steps))
@@ -213,23 +223,37 @@ def list_command() -> None:
     """Name the shipped studies."""
     for name in shipped_studies():
         study = load_study(name)
-        out.print(f"{name:<12}  {len(study.cases):>5} {'case ' if len(study.cases) == 1 else 'cases'}  {study.title}", markup=False)
+        out.print(
+            f"{name:<12}  {len(study.cases):>5} {'case ' if len(study.cases) == 1 else 'cases'}  {study.title}", markup=False
+        )
 
 
 @app.command()
 def schema() -> None:
     """List every field of a study file: unit, default, rule, meaning."""
-    out.print('title = "…", model = "coral-2010", then tables with these fields (layer.N is the N-th \\[\\[layer]] from the top):\n')
-    grid = Table(box=None, pad_edge=False)
-    for name in ("field", "unit", "default", "rule", "meaning"):
-        grid.add_column(name, overflow="fold")
+    for line in _schema_lines():
+        out.print(line, markup=False, soft_wrap=True)
+
+
+def _schema_lines() -> Iterator[str]:
+    """The fields as a study file would hold them, with rule and meaning behind."""
+    yield 'title = "…"'
+    yield f"model = {' | '.join(PRESETS)}"
+    table = ""
     for field in catalogue():
-        grid.add_row(field.name, field.unit, field.default, field.rule, field.meaning)
-    out.print(grid)
-    out.print(
-        "\n\\[sweep] makes a grid of any of these: p0 = \\[0, \"1 MPa\"], or { from, to, num, spacing = \"linear\" | \"log\" }.\n"
-        "A key is the dotted name, the same with underscores (damping_ratio), or the last part where it is unique (p0)."
-    )
+        *path, last = field.path
+        if (head := ".".join(path)) != table:
+            table = head
+            yield (
+                "\n[[layer]]                      # once for every layer, from the top" if table == "layer.N" else f"\n[{table}]"
+            )
+        value = f'"{field.default}"' if field.unit and field.default != "–" else field.default
+        if field.default == "–" and field.unit:
+            value = f'"… {field.unit}"'
+        yield f"{last:<16} = {value:<16} # {'; '.join(part for part in (field.meaning, field.rule) if part)}"
+    yield "\n[sweep]                        # a grid of any of these"
+    yield 'p0 = [0, "1 MPa", { from = "2 MPa", to = "4 MPa", num = 3, spacing = "linear" }]    # or "log"'
+    yield "# a key is the dotted name (pressure.p0), that with underscores (damping_ratio), or the last part where it is unique (p0)"
 
 
 if __name__ == "__main__":

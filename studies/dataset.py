@@ -69,8 +69,11 @@ SCHEMA: dict[str, Variable] = {
     "penetration": Variable((), "m", "largest penetration of the penalty joints"),
     "frequency": Variable(("mode",), "Hz", "natural frequencies with all joints closed and sticking"),
     "base_acceleration": Variable(("time", "component"), "m/s2", "acceleration of the rigid base"),
+    "peak_base_acceleration": Variable(("component",), "m/s2", "largest magnitude of the base acceleration"),
     "closed_before_shaking": Variable((), "1", "share of the joint length that carries pressure before the shaking"),
-    "uplift_over_weight": Variable((), "1", "net uplift of the water pressure over the box's weight", "9.81 m/s² or the study's own"),
+    "uplift_over_weight": Variable(
+        (), "1", "net uplift of the water pressure over the box's weight", "9.81 m/s² or the study's own"
+    ),
 }
 
 COORDINATES: dict[str, Variable] = {
@@ -95,7 +98,9 @@ def build_dataset(study: Study, models: Sequence[Model], parts: Sequence[dict[st
     for name, variable in SCHEMA.items():
         ds[name] = _variable(name, variable, study, parts, owner, grid)
     for axis in study.axes:
-        ds = ds.assign_coords({axis.name: (axis.name, list(axis.values), _attributes(axis.field.unit or "1", axis.field.meaning))})
+        ds = ds.assign_coords(
+            {axis.name: (axis.name, list(axis.values), _attributes(axis.field.unit or "1", axis.field.meaning))}
+        )
     ds = ds.assign_coords(time=("time", grid, _attributes("s", COORDINATES["time"].long_name)))
     model = models[0]
     ds = ds.assign_coords(
@@ -246,7 +251,9 @@ def _with_mesh(ds: xr.Dataset, model: Model, only_one: bool) -> xr.Dataset:
     )
     n_layer = len(model.spec.layer)
     comment = f"0 to {n_layer - 1}: layers from the top; {n_layer}: structure"
-    ds["mesh_layer"] = xr.Variable(("face",), mesh.material.astype(np.int32), {"long_name": "layer of the triangle", "comment": comment})
+    ds["mesh_layer"] = xr.Variable(
+        ("face",), mesh.material.astype(np.int32), {"long_name": "layer of the triangle", "comment": comment}
+    )
     ds["joint_nodes"] = xr.Variable(
         ("joint", "joint_corner"), _joint_nodes(model), {"long_name": "nodes of the joint element: 1-2 ground, 3-4 structure"}
     )

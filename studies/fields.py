@@ -52,7 +52,16 @@ def _field(name: str, schema: dict[str, Any], default: Any) -> Field:
     return Field(name, "" if unit == "1" else unit, _rule(facts), _text(default, unit), facts.get("description", ""))
 
 
-_LIMITS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+_LIMITS = {
+    "exclusiveMinimum": ">",
+    "minimum": "≥",
+    "exclusiveMaximum": "<",
+    "maximum": "≤",
+    "gt": ">",
+    "ge": "≥",
+    "lt": "<",
+    "le": "≤",
+}
 
 
 def _rule(facts: dict[str, Any]) -> str:

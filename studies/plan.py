@@ -293,7 +293,9 @@ def _case(base: Spec, settings: list[tuple[Axis, Any]], mistakes: list[str]) -> 
     try:
         return Spec.model_validate(table)
     except ValidationError as error:
-        mistakes.extend(f"sweep.{settings[0][0].name}: {line}" if len(settings) == 1 else f"sweep: {line}" for line in explain(error))
+        mistakes.extend(
+            f"sweep.{settings[0][0].name}: {line}" if len(settings) == 1 else f"sweep: {line}" for line in explain(error)
+        )
         return None
 
 

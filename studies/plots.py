@@ -122,39 +122,50 @@ def _joint_line(ax: Axes, ds: xr.Dataset, width: float, colour: str) -> None:
 def record_figure(cases: xr.Dataset) -> Figure:
     """Base acceleration of the first case, every direction that moves."""
     motion = cases["base_acceleration"].isel(case=0)
-    moving = [c for c in ("x", "y") if float(np.abs(motion.sel(component=c)).max()) > 0] or ["x"]
+    peaks = cases["peak_base_acceleration"].isel(case=0)
+    moving = [c for c in ("x", "y") if float(peaks.sel(component=c)) > 0] or ["x"]
     fig = Figure(figsize=(WIDTH, 0.5 + 1.5 * len(moving)))
     for i, component in enumerate(moving):
         ax = fig.add_subplot(len(moving), 1, i + 1)
-        values = motion.sel(component=component).values
-        ax.plot(cases["time"], values, color="black", lw=0.6)
-        peak = int(np.nanargmax(np.abs(values)))
-        ax.plot(cases["time"][peak], values[peak], "o", color="#d95f02", markersize=3.5)
+        ax.plot(cases["time"], motion.sel(component=component), color="black", lw=0.6)
         direction = "horizontal" if component == "x" else "vertical"
-        ax.set_title(f"{direction} base acceleration, largest kept value {abs(values[peak]):.3g} m/s²", loc="left")
+        peak = float(peaks.sel(component=component))
+        ax.set_title(f"{direction} base acceleration, peak {peak:.4g} m/s²", loc="left")
         ax.set(ylabel="acceleration [m/s²]", xlim=(0, float(cases["time"][-1])))
+        ax.axhline(0, color="0.6", lw=0.5, zorder=0)
     ax.set_xlabel("time [s]")
     return fig
 
 
+ZOOM = 1.0
+"""[s] shown beside each whole history, about the moment of the largest displacement."""
+
+
 def history_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
-    """Horizontal displacement at A, and both readings of the source's stress: xx at C, yy at A."""
+    """Horizontal displacement at A, and both readings of the source's stress (xx at C, yy at A) less its static value."""
     rows = (
         ("$u_x$ at A [mm]", cases["displacement"].sel(point="A", component="x"), 1e3),
-        (r"$\sigma_{xx}$ at C [MPa]", cases["stress"].sel(point="C", stress_component="xx"), 1e-6),
-        (r"$\sigma_{yy}$ at A [MPa]", cases["stress"].sel(point="A", stress_component="yy"), 1e-6),
+        (r"$\Delta\sigma_{xx}$ at C [kPa]", cases["stress"].sel(point="C", stress_component="xx"), 1e-3),
+        (r"$\Delta\sigma_{yy}$ at A [kPa]", cases["stress"].sel(point="A", stress_component="yy"), 1e-3),
     )
-    fig = Figure(figsize=(WIDTH, 5.2))
-    panels = [fig.add_subplot(len(rows), 1, 1)]
-    panels += [fig.add_subplot(len(rows), 1, i + 1, sharex=panels[0]) for i in range(1, len(rows))]
-    for ax, (label, values, factor) in zip(panels, rows, strict=True):
+    time = cases["time"].values
+    moment = time[int(np.nanargmax(np.abs(rows[0][1].isel(case=max(shown)).values)))]
+    start = float(np.clip(moment - ZOOM / 2, 0, max(time[-1] - ZOOM, 0)))
+    fig = Figure(figsize=(WIDTH, 5.4))
+    panels = fig.subplots(len(rows), 2, sharex="col", sharey="row", width_ratios=(1.6, 1))
+    for (label, values, factor), (whole, part) in zip(rows, panels, strict=True):
         for (case, name), (colour, dash) in zip(shown.items(), LINES, strict=False):
-            ax.plot(cases["time"], factor * values.isel(case=case), color=colour, ls=dash, lw=0.7, label=name)
-        ax.set_ylabel(label)
-    panels[0].set_xlim(0, float(cases["time"][-1]))
-    panels[-1].set_xlabel("time [s]")
+            history = factor * (values.isel(case=case) - values.isel(case=case, time=0))
+            whole.plot(time, history, color=colour, ls="-", lw=0.5, alpha=0.8)
+            part.plot(time, history, color=colour, ls=dash, label=name)
+        whole.set_ylabel(label)
+        whole.axvspan(start, start + ZOOM, color="0.88", zorder=0)
+    panels[0, 0].set_xlim(0, time[-1])
+    panels[0, 1].set_xlim(start, start + ZOOM)
+    for ax in panels[-1]:
+        ax.set_xlabel("time [s]")
     if any(shown.values()):
-        fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(shown))
+        fig.legend(*panels[0, 1].get_legend_handles_labels(), loc="outside upper right", ncols=len(shown))
     return fig
 
 
@@ -163,33 +174,34 @@ def peaks_figure(cases: xr.Dataset, axis: str) -> Figure:
     unit = cases[axis].attrs["units"].replace("**", "")
     factor, prefix = (1e-6, "M") if unit == "Pa" else (1.0, "")
     x = factor * cases[axis].values
-    fig = Figure(figsize=(WIDTH, 4.2))
+    at_c = {"point": "C", "stress_component": "xx"}
+    at_a = {"point": "A", "stress_component": "yy"}
     panels = (
-        ("peak $u_x$ at A [mm]", [("total", _of_a(cases, ""), 1e3), ("minus static", _of_a(cases, "_dynamic"), 1e3)]),
-        (
-            "peak racking [mm]",
-            [("box", cases["peak_racking"], 1e3), ("free field", cases["peak_racking_free_field"], 1e3)],
-        ),
-        (
-            "largest in the joint [mm]",
-            [("opening", cases["max_opening"].max("joint"), 1e3), ("slip", cases["max_slip"].max("joint"), 1e3)],
-        ),
-        ("closed before shaking [%]", [("", cases["closed_before_shaking"], 100.0)]),
+        ("peak $u_x$ at A [mm]", {"": 1e3 * cases["peak_displacement"].sel(point="A", component="x")}),
+        ("peak racking [mm]", {"box": 1e3 * cases["peak_racking"], "free field": 1e3 * cases["peak_racking_free_field"]}),
+        ("largest in the joint [mm]", {"opening": 1e3 * _largest(cases, "opening"), "slip": 1e3 * _largest(cases, "slip")}),
+        ("closed before shaking [%]", {"": 100 * cases["closed_before_shaking"]}),
+        (r"peak $\sigma_{xx}$ at C [MPa]", _total_and_dynamic(cases["peak_stress"], cases["peak_stress_dynamic"], at_c)),
+        (r"peak $\sigma_{yy}$ at A [MPa]", _total_and_dynamic(cases["peak_stress"], cases["peak_stress_dynamic"], at_a)),
     )
-    for i, (label, curves) in enumerate(panels):
-        ax = fig.add_subplot(2, 2, i + 1)
-        for (name, values, scale), (colour, dash), marker in zip(curves, LINES, "os", strict=False):
-            ax.plot(x, scale * values, color=colour, ls=dash, marker=marker, markersize=3, label=name)
+    fig = Figure(figsize=(WIDTH, 6.2))
+    for (label, curves), ax in zip(panels, fig.subplots(3, 2).flat, strict=True):
+        for (name, values), (colour, dash), marker in zip(curves.items(), LINES, "os", strict=False):
+            ax.plot(x, values, color=colour, ls=dash, marker=marker, markersize=3, label=name, clip_on=False)
         _scale_x(ax, x)
-        ax.set_ylim(bottom=0)
-        ax.set(ylabel=label, xlabel=f"{_symbol(axis)} [{prefix}{unit}]")
+        ax.set_ylim(0, 100 if "%" in label else None)
+        ax.set(ylabel=label, xlabel=f"{_symbol(axis)} [{prefix}{unit}]" if unit != "1" else _symbol(axis))
         if len(curves) > 1:
             ax.legend()
     return fig
 
 
-def _of_a(cases: xr.Dataset, kind: str) -> xr.DataArray:
-    return cases[f"peak_displacement{kind}"].sel(point="A", component="x")
+def _largest(cases: xr.Dataset, what: str) -> xr.DataArray:
+    return cases[f"max_{what}"].max("joint")
+
+
+def _total_and_dynamic(total: xr.DataArray, dynamic: xr.DataArray, place: dict[str, str]) -> dict[str, xr.DataArray]:
+    return {"total": 1e-6 * total.sel(place), "minus static": 1e-6 * dynamic.sel(place)}
 
 
 def _scale_x(ax: Axes, x: np.ndarray) -> None:
@@ -209,7 +221,7 @@ def _scale_x(ax: Axes, x: np.ndarray) -> None:
 
 def deformed_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     """The box and the ground round it at the moment of the largest racking, open joints red, slipping ones orange."""
-    fig = Figure(figsize=(WIDTH, WIDTH / len(shown) + 0.9 if len(shown) > 1 else 0.75 * WIDTH))
+    fig = Figure(figsize=(WIDTH, 0.82 * WIDTH / len(shown) + 0.85 if len(shown) > 1 else 0.7 * WIDTH))
     for i, (case, name) in enumerate(shown.items()):
         ax = fig.add_subplot(1, len(shown), i + 1)
         factor = _deformed(ax, cases.isel(case=case))
@@ -231,10 +243,9 @@ def _deformed(ax: Axes, case: xr.Dataset) -> float:
     box = nodes[np.unique(faces[structure])]
     low, high = box.min(axis=0), box.max(axis=0)
     margin = 0.3 * (high - low)
-    near = ((nodes[faces] > low - margin) & (nodes[faces] < high + margin)).all(axis=(1, 2))
-    u = case["shape"].values
-    u = u - np.median(u[np.unique(faces[near])], axis=0)
-    largest = np.abs(u[np.unique(faces[near])]).max()
+    near = ((nodes[faces] > low - margin) & (nodes[faces] < high + margin)).all(axis=2).any(axis=1)
+    u = case["shape"].values - np.median(case["shape"].values[np.unique(faces[structure])], axis=0)
+    largest = np.abs(u[np.unique(faces[structure])]).max()
     factor = _round_down(0.08 * float((high - low).max()) / largest) if largest > 0 else 1.0
     moved = nodes + factor * u
     for chosen, colour, edge in ((near & ~structure, "0.92", "0.75"), (structure, "#a9c5da", "#5b7c94")):
@@ -246,23 +257,26 @@ def _deformed(ax: Axes, case: xr.Dataset) -> float:
 
 
 def _joint_states(ax: Axes, case: xr.Dataset, moved: np.ndarray) -> None:
-    """The structure's edge at every joint point, half an element to each side, in the colour of its state."""
+    """The structure's moved outline, the tributary length of every joint point in the colour of its state."""
     corners = case["joint_nodes"].values.astype(int)
-    place = np.column_stack([case["joint_x"], case["joint_y"]])
     original = np.column_stack([case["mesh_node_x"], case["mesh_node_y"]])
-    half = 0.5 * case["joint_length"].values
-    states = case["shape_state"].values
-    for point, ends in enumerate(corners):
-        if np.isnan(states[point]):
-            continue
-        first, last = original[ends[3]], original[ends[2]]
-        along = (last - first) / np.linalg.norm(last - first)
-        centre = (place[point] - first) @ along / np.linalg.norm(last - first)
-        reach = half[point] / np.linalg.norm(last - first)
-        span = np.clip([centre - reach, centre + reach], 0, 1)
-        line = moved[ends[3]] + span[:, None] * (moved[ends[2]] - moved[ends[3]])
-        colour = JOINT_COLOURS[JOINT_STATES[int(states[point])]]
-        ax.plot(*line.T, color=colour, lw=2.5, solid_capstyle="butt", zorder=4)
+    first, last = corners[:, 3], corners[:, 2]
+    before = np.linalg.norm(np.column_stack([case["joint_x"], case["joint_y"]]) - original[first], axis=1)
+    element = np.linalg.norm(original[last] - original[first], axis=1)
+    arc, length = case["joint_arc"].values, case["joint_length"].values
+    for side in np.unique(case["joint_side"].values):
+        on = np.flatnonzero(case["joint_side"].values == side)
+        node_arc = np.concatenate([(arc - before)[on], (arc - before + element)[on]])
+        order = np.argsort(node_arc)
+        line = moved[np.concatenate([first[on], last[on]])][order]
+        begin, end = node_arc.min(), node_arc.max()
+        for p in on[~np.isnan(case["shape_state"].values[on])]:
+            low = arc[p] - (length[p] if np.isclose(arc[p], end) else length[p] / 2)
+            high = arc[p] + (length[p] if np.isclose(arc[p], begin) else length[p] / 2)
+            span = np.clip([low, min(max(arc[p], low), high), high], begin, end)
+            xy = [np.interp(span, node_arc[order], line[:, i]) for i in range(2)]
+            colour = JOINT_COLOURS[JOINT_STATES[int(case["shape_state"].values[p])]]
+            ax.plot(*xy, color=colour, lw=2.5, solid_capstyle="butt", zorder=4)
 
 
 def _round_down(value: float) -> float:

@@ -100,6 +100,7 @@ def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress |
         "racking_free_field": field.racking,
         "peak_racking_free_field": field.peak,
         "base_acceleration": base,
+        "peak_base_acceleration": np.array([np.abs(motion).max(axis=0) for motion in motions]),
         "uplift_over_weight": np.array([uplift_over_weight(model, spec) for spec in specs]),
     }
     return Outcome(model, case_arrays(model, response, extra))

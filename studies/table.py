@@ -62,6 +62,8 @@ def in_words(value: object, unit: str) -> str:
     if isinstance(value, (str, bool, np.str_, np.bool_)):
         return str(value)
     number = float(value)  # type: ignore[arg-type]
+    if number == 0.0:
+        return "0"
     unit = unit.replace("**", "")
     if unit in ("Pa", "Hz"):
         for factor, prefix in _PREFIXES:
@@ -126,4 +128,5 @@ def _racking(cases: xr.Dataset, axes: list[str]) -> str:
     low, high = int(np.nanargmin(ratio)), int(np.nanargmax(ratio))
     if len(ratio) == 1:
         return f"Peak racking is {ratio[0]:.2g} × the free field's."
-    return f"Peak racking is {ratio[low]:.2g}{_at(cases, axes, low)} to {ratio[high]:.2g} × the free field's{_at(cases, axes, high)}."
+    most = f"{ratio[high]:.2g} ×{_at(cases, axes, high)}"
+    return f"Peak racking is {ratio[low]:.2g} × the free field's{_at(cases, axes, low)} and {most}."
