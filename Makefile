@@ -1,0 +1,56 @@
+# Everything a user or a CI types. Works from a bare clone with Python >= 3.11 and make.
+
+PYTHON ?= $(shell for p in python3.14 python3.13 python3.12 python3.11 python3 python; do \
+	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
+STUDY ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help install study test verify check clean
+
+help: ## list the targets
+	@echo "make study              run all named studies, from nothing; results and figures in results/"
+	@echo "make study STUDY=p0     run one of them, or a study file"
+	@echo "make test               run the tests"
+	@echo "make verify             run the verification cases alone, with their names"
+	@echo "make check              style, format, import contract, types"
+	@echo "make install            make .venv with the command .venv/bin/coralquake"
+	@echo "make clean              remove .venv, caches and what studies wrote to results/"
+
+.venv/made:
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed and was not found; install it, or say: make PYTHON=/path/to/python"; exit 2; }
+	@$(PYTHON) -c "import ensurepip, venv" 2>/dev/null || { echo "$(PYTHON) has no venv module; on Debian and Ubuntu: apt install python3-venv"; exit 2; }
+	$(PYTHON) -m venv .venv
+	@touch $@
+
+.venv/installed: .venv/made pyproject.toml pins.txt
+	$(PIP) install --quiet --constraint pins.txt --editable .
+	@touch $@
+
+.venv/tools: .venv/installed
+	$(PIP) install --quiet --constraint pins.txt --editable ".[dev]"
+	@touch $@
+
+install: .venv/installed
+	@echo "ready: $(BIN)/coralquake --help"
+
+study: .venv/installed
+	$(BIN)/coralquake run --plot $(if $(STUDY),"$(STUDY)",--all)
+
+test: .venv/tools
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
+verify: .venv/tools
+	$(BIN)/python -m pytest tests/verification --verbose
+
+check: .venv/tools
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/mypy
+
+clean:
+	rm -rf .venv build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	find results -type f ! -name README.md -delete
