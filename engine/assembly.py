@@ -141,7 +141,7 @@ class System:
         return sp.csr_array(self.K + self.B.T @ sp.diags_array(np.column_stack([k_n, k_s]).ravel()) @ self.B)
 
     def pressure_load(self, nodal_pressure: Floats) -> Floats:
-        """Load (n_dof,) of a pressure (n_node,) linear along every pressure edge, pushing to the edge's left: f1 = L (2 p1 + p2)/6."""
+        """Load (n_dof,) of a pressure (n_node,), linear along every pressure edge, pushing to its left: f1 = L (2 p1 + p2)/6."""
         edges, nodes = self.mesh.pressure_edges, self.mesh.nodes
         along = nodes[edges[:, 1]] - nodes[edges[:, 0]]
         inward = np.column_stack([-along[:, 1], along[:, 0]]) * self.thickness
@@ -241,14 +241,15 @@ def _stress_operator(mesh: Mesh, S: Floats) -> sp.csr_array:
 def joint_points(mesh: Mesh, quadrature: Quadrature, thickness: float) -> JointPoints:
     """Points of all joints: two at the nodes of each (Lobatto) or one in its middle (D2).
 
-    Points of neighbours at one node pair are one point where normal and material agree; a corner or a layer boundary keeps two (D3).
+    Points of neighbours at one node pair are one where normal and material agree; a corner or a layer boundary keeps two (D3).
     """
     start, end = mesh.nodes[mesh.joints[:, 0]], mesh.nodes[mesh.joints[:, 1]]
     length = np.linalg.norm(end - start, axis=1)
     along = (end - start) / np.where(length > 0, length, 1.0)[:, None]
     normal = np.column_stack([-along[:, 1], along[:, 0]])
     before = np.concatenate([[0.0], np.cumsum(length)[:-1]]) if len(length) else length
-    found: dict[tuple, list] = {}
+    found: dict[tuple, tuple[int, float, float]] = {}
+    tributary: dict[tuple, float] = {}
     for e in range(len(mesh.joints)):
         places = [(0.5, 1.0)] if quadrature == "one-point" else [(0.0, 0.5), (1.0, 0.5)]
         for position, share in places:
@@ -258,18 +259,19 @@ def joint_points(mesh: Mesh, quadrature: Quadrature, thickness: float) -> JointP
                 else tuple(mesh.joints[e][[0, 3]] if position == 0.0 else mesh.joints[e][[1, 2]])
             )
             key = (pair, int(mesh.joint_material[e]), *np.round(normal[e], 9))
-            point = found.setdefault(key, [e, position, before[e] + position * length[e], 0.0])
-            point[3] += share * length[e]
-    elements = np.array([p[0] for p in found.values()], dtype=np.int64)
-    position, arc, tributary = (np.array([p[i] for p in found.values()], dtype=float) for i in (1, 2, 3))
+            found.setdefault(key, (e, position, before[e] + position * length[e]))
+            tributary[key] = tributary.get(key, 0.0) + share * length[e]
+    elements = np.array([e for e, _, _ in found.values()], dtype=np.int64)
+    part, arc = (np.array([point[i] for point in found.values()], dtype=float) for i in (1, 2))
+    own_length = np.array(list(tributary.values()), dtype=float)
     return JointPoints(
         nodes=mesh.joints[elements].reshape(-1, 4),
-        shape=np.column_stack([position - 1, -position, position, 1 - position]),
+        shape=np.column_stack([part - 1, -part, part, 1 - part]),
         normal=normal[elements].reshape(-1, 2),
-        area=tributary * thickness,
-        length=tributary,
+        area=own_length * thickness,
+        length=own_length,
         arc=arc,
-        place=(start[elements] + position[:, None] * (end - start)[elements]).reshape(-1, 2),
+        place=(start[elements] + part[:, None] * (end - start)[elements]).reshape(-1, 2),
         material=mesh.joint_material[elements],
     )
 

@@ -10,7 +10,7 @@ from math import ceil, exp, log
 
 import numpy as np
 
-from .mesh import Floats, Ints, Mesh
+from .mesh import Flags, Floats, Ints, Mesh
 from .spec import Box, Layer, MeshOptions, Spec
 
 SLIVER = 0.25
@@ -133,7 +133,7 @@ class _Grid:
 
 @dataclass(frozen=True)
 class _Cells:
-    """Cells of the grid, row by row: lower left node, layer (the structure counts after them), kind 0 ground, 1 structure, 2 void.
+    """Cells of the grid, row by row: lower left node, layer (the structure comes last), kind 0 ground, 1 structure, 2 void.
 
     outside : layer on the other side of each edge of the outline, -1 where there is no ground
     """
@@ -141,7 +141,7 @@ class _Cells:
     origin: Ints
     layer: Ints
     kind: Ints
-    right_of_axis: Ints
+    right_of_axis: Flags
     outside: Ints
 
 
@@ -227,7 +227,7 @@ def layer_at(depth: Floats, layers: tuple[Layer, ...]) -> Ints:
     return np.searchsorted(bottoms, depth)
 
 
-def _split(grid: _Grid, cells: _Cells, chosen: Ints, shift: int) -> Ints:
+def _split(grid: _Grid, cells: _Cells, chosen: Flags, shift: int) -> Ints:
     """Two triangles for each chosen cell, diagonals mirrored about the box's axis; node numbers moved by `shift`."""
     sw = cells.origin[chosen] + shift
     se, nw = sw + 1, sw + len(grid.x)
@@ -291,7 +291,7 @@ def _with_named_points(mesh: Mesh, spec: Spec) -> Mesh:
     return with_names
 
 
-def _nearest(mesh: Mesh, place: tuple[float, float], among: Ints) -> int:
+def _nearest(mesh: Mesh, place: tuple[float, float], among: Flags) -> int:
     candidates = np.flatnonzero(among)
     return int(candidates[np.argmin(((mesh.nodes[candidates] - place) ** 2).sum(axis=1))])
 
@@ -302,10 +302,9 @@ def column_mesh(y: Floats, layers: tuple[Layer, ...]) -> Mesh:
     nodes = np.column_stack([np.tile([0.0, 1.0], len(y)), np.repeat(y, 2)])
     sw = 2 * rows[:-1]
     triangles = np.stack([np.column_stack([sw, sw + 1, sw + 3]), np.column_stack([sw, sw + 3, sw + 2])], axis=1)
-    mesh = Mesh(
+    return Mesh(
         nodes=nodes,
         triangles=triangles.reshape(-1, 3),
         material=np.repeat(layer_at(-(y[:-1] + y[1:]) / 2, layers), 2),
         boundaries={"base": np.array([0, 1]), "left": 2 * rows, "right": 2 * rows + 1},
     )
-    return mesh

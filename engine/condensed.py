@@ -11,7 +11,7 @@ from .kernels.contact import Law, Workspace, workspace
 from .kernels.jit import LANES
 from .kernels.march import Contact, solve_joints
 from .kernels.sparse import Factor, Rows, backward, forward, product, subtract_transposed_product
-from .mesh import Floats, MeshError
+from .mesh import Flags, Floats, MeshError
 
 MAX_ROUNDS = 72
 """Direct solves a joint solve may take; the sweeps between them add up to some 2,000 by then."""
@@ -85,10 +85,11 @@ class Condensed:
 
     def solve(
         self, rhs: Floats, law: Law, n_lane: int, before: Contact, found: Contact, damping: JointDamping | None = None
-    ) -> Floats:
-        """Fill self.u, self.rounds, self.residual, self.source and `found`, take the joint forces off `rhs`; (n_lane,) True where it failed.
+    ) -> Flags:
+        """Solve for u and the joints: fills self.u, rounds, residual, source and `found`; (n_lane,) True where it failed.
 
-        rhs : (n_dof, LANES); before : joint state the solve starts from; a lane that fails is given that state's forces.
+        rhs : (n_dof, LANES), the joint forces are taken off it
+        before : joint state the solve starts from; a lane that fails is given that state's forces
         """
         start = self.factor.n_interior
         self.u[:] = rhs
@@ -97,7 +98,8 @@ class Condensed:
         backward(self.factor, start, self._tail)
         product(self.B, self._tail, self._gap)
         if damping is not None:
-            self._gap[:] = np.stack([T @ g for T, g in zip(damping.T, self._gap.T - damping.offset @ self.G[0], strict=True)]).T
+            for lane in range(n_lane):
+                self._gap[:, lane] = damping.T[lane] @ (self._gap[:, lane] - self.G[0] @ damping.offset[lane])
         for name in ("gap", "force", "state"):
             getattr(found, name)[:] = getattr(before, name)
         G = self.G if damping is None else damping.G

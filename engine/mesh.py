@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 class MeshError(ValueError):
@@ -49,14 +50,14 @@ class Mesh:
     pressure_edges: Ints = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     boundaries: dict[str, Ints] = field(default_factory=dict)
     corners: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    structure: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    structure: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
     probes: dict[str, Probe] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.structure) == 0:
             object.__setattr__(self, "structure", np.zeros(len(self.triangles), dtype=bool))
         for name, kind in _ARRAYS.items():
-            array = np.ascontiguousarray(getattr(self, name), dtype=kind)
+            array: np.ndarray = np.ascontiguousarray(getattr(self, name), dtype=kind)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         _check(self)
@@ -81,7 +82,7 @@ class Mesh:
             raise MeshError(f"probe ({x:g}, {y:g}): lies outside the mesh")
         return Probe(x, y, self.triangles[best], barycentric[best], np.array([best]), np.ones(1))
 
-    def probe_on(self, node: int, among: NDArray[np.bool_] | None = None) -> Probe:
+    def probe_on(self, node: int, among: Flags | None = None) -> Probe:
         """Probe on a node: its displacement, and the area-weighted mean stress of the triangles round it (`among` selects)."""
         selected = np.ones(len(self.triangles), dtype=bool) if among is None else among
         triangles = np.flatnonzero((self.triangles == node).any(axis=1) & selected)
@@ -120,7 +121,7 @@ def _check(mesh: Mesh) -> None:
     for name, width in (("triangles", 3), ("joints", 4), ("pressure_edges", 2)):
         array = getattr(mesh, name)
         _require(array.ndim == 2 and array.shape[1] == width, f"{name}: shape {array.shape}, must be (n, {width})")
-        _require(array.size == 0 or (0 <= array.min() and array.max() < n), f"{name}: must name nodes 0 to {n - 1}")
+        _require(array.size == 0 or (array.min() >= 0 and array.max() < n), f"{name}: must name nodes 0 to {n - 1}")
     for name, owner in (("material", "triangles"), ("joint_material", "joints"), ("structure", "triangles")):
         count = len(getattr(mesh, owner))
         _require(getattr(mesh, name).shape == (count,), f"{name}: must have one entry for each of the {count} {owner}")

@@ -99,7 +99,7 @@ def simulate_cases(
 
 @dataclass(frozen=True)
 class FreeField:
-    """Racking of the ground without the box between the depths of roof and invert: history (n_lane, n_time) and peak (n_lane,) [m]."""
+    """Racking of the ground without the box, between the depths of roof and invert: (n_lane, n_time) and peak (n_lane,) [m]."""
 
     racking: Floats
     peak: Floats

@@ -26,7 +26,10 @@ def _eigenvalues(system: System, count: int) -> Floats:
 
 
 def rayleigh_coefficients(ratio: float, first: float, second: float) -> tuple[float, float]:
-    """(rayleigh_alpha [1/s], rayleigh_beta [s]) for a damping ratio at two frequencies [Hz]: beta = 2 xi/(w1 + w2), alpha = w1 w2 beta."""
+    """(rayleigh_alpha [1/s], rayleigh_beta [s]) of a damping ratio at two frequencies [Hz] (D5).
+
+    beta = 2 xi/(w1 + w2), alpha = w1 w2 beta
+    """
     w1, w2 = 2 * np.pi * first, 2 * np.pi * second
     beta = 2 * ratio / (w1 + w2)
     return w1 * w2 * beta, beta

@@ -1,6 +1,7 @@
 """Stepper: one Newmark step of all lanes with a constant, once-factorised matrix (D6–D9), and the halving of steps."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Newmark:
 
 @dataclass(frozen=True)
 class StepReport:
-    """Of one step, (LANES,): direct solves, relative residual (D9), the source's test, whether it was halved, whether even that failed."""
+    """Of one step, (LANES,): direct solves, relative residual (D9), the source's test, whether halved, whether that failed."""
 
     rounds: np.ndarray
     residual: Floats
@@ -98,7 +99,7 @@ class Stepper:
     def step(self, state: State, lanes: Lanes, ground: Floats, ground_end: Floats) -> StepReport:
         """Advance all lanes by dt; base acceleration (2, LANES) at start and end, linear between where a step is halved."""
         failed = self._solve(state, lanes, ground_end)
-        before = {lane: state.alone(lane) for lane in np.flatnonzero(failed)}
+        before = {lane: state.alone(lane) for lane in np.flatnonzero(failed).tolist()}
         self._commit(state, lanes, ground, ground_end)
         solver, no = self.condensed, np.zeros(LANES, bool)
         report = StepReport(solver.rounds.copy(), solver.residual.copy(), solver.source.copy(), no, no.copy())
@@ -132,7 +133,7 @@ class Stepper:
         for times in range(1, MAX_HALVINGS + 1):
             stepper, trial, parts = self.halved(times), start.copy(), 2**times
             at = [path[0] + (path[1] - path[0]) * i / parts for i in range(parts + 1)]
-            if all(stepper._part(trial, alone, *ends) for ends in zip(at[:-1], at[1:], strict=True)):
+            if all(stepper._part(trial, alone, *ends) for ends in pairwise(at)):
                 state.put(lane, trial)
                 report.rounds[lane] = stepper.condensed.rounds[0]
                 report.residual[lane] = stepper.condensed.residual[0]
@@ -172,7 +173,7 @@ class _JointDampingCache:
     def _eliminate(self, slope: Floats, n_lane: int) -> None:
         """T and T G of the lanes whose dashpots have changed."""
         G = self._stepper.condensed.G[0]
-        for lane in np.flatnonzero((slope != self._pattern).any(axis=1)):
+        for lane in np.flatnonzero((slope != self._pattern).any(axis=1)).tolist():
             if lane < n_lane:
                 self._T[lane] = np.linalg.inv(np.eye(len(G)) + G * slope[lane])
                 flexibility = self._T[lane] @ G

@@ -1,7 +1,7 @@
 """The only time loop: a batch of lanes from its static equilibrium through the shaking to a Response."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -11,7 +11,7 @@ from .kernels.jit import LANES
 from .kernels.joint import OPEN
 from .kernels.march import JOINT_ELASTIC, STRAIN, audit, joint_fractions, observe, observe_joints
 from .kernels.sparse import Rows, product
-from .mesh import Floats
+from .mesh import Flags, Floats
 from .newmark import Stepper, StepReport
 from .recorder import Recorder
 from .state import Lanes, State
@@ -41,7 +41,8 @@ class ConvergenceError(RuntimeError):
 class Response:
     """What a batch did, lane first. A failed lane holds NaN and says why in `reason`.
 
-    time : (n_time,) [s]; values : (n_lane, n_time, n_value) in the recorder's order; fractions : (n_lane, n_time, 2) open, slipping
+    time : (n_time,) [s]; values : (n_lane, n_time, n_value) in the recorder's order
+    fractions : (n_lane, n_time, 2) of the joint length that is open, that slips
     peaks : (n_lane, 2, n_value) largest magnitudes, total and minus static
     joint_peaks : (n_lane, 4, n_point) opening [m], slip [m], pressure [Pa], penetration [m]
     first_slip : (n_lane, n_point) [s] when a closed point first slid beyond its elastic range before the shaking, NaN where never
@@ -108,7 +109,8 @@ class _Run:
     """The arrays that a march fills."""
 
     def __init__(self, stepper: Stepper, lanes: Lanes, every: int) -> None:
-        self.stepper, self.lanes, self.every = stepper, lanes, every
+        self.stepper, self.every = stepper, every
+        self.lanes = replace(lanes, standing=lanes.standing.copy(), ground=lanes.ground.copy())
         self.system: System = stepper.system
         self.recorder = Recorder.of(self.system)
         self._operator: Rows = rows(self.recorder.operator)
@@ -171,7 +173,7 @@ class _Run:
         np.maximum(self.residual[:n], report.residual[:n], out=self.residual[:n])
         np.maximum(self.source_test[:n], report.source[:n], out=self.source_test[:n])
         time = step * self.stepper.newmark.dt
-        finite = np.isfinite(self.state.energy).all(axis=0)
+        finite: Flags = np.asarray(np.isfinite(self.state.energy).all(axis=0))
         if finite[:n].all() and not report.halved.any():
             return
         for lane in np.flatnonzero(self.alive):
@@ -222,7 +224,7 @@ class _Run:
 
         return Response(
             recorder=self.recorder,
-            time=np.arange(len(self.kept)) * self.every * self.stepper.newmark.dt,
+            time=self.stepper.newmark.dt * self.every * np.arange(len(self.kept), dtype=float),
             values=of_lanes(self.kept, 2),
             fractions=of_lanes(self.fractions, 2),
             peaks=of_lanes(self.peaks, 2),

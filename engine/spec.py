@@ -5,6 +5,7 @@ box lies nor how the sides are held: the roof is taken at 4 m depth, where the b
 pressure grows linearly with depth from zero at the surface.
 """
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -64,14 +65,14 @@ class Layer(Section):
     @property
     def rho(self) -> float:
         """Density [kg/m³]."""
-        return self.density if self.density is not None else self.unit_weight / STANDARD_GRAVITY
+        return self.unit_weight / STANDARD_GRAVITY if self.unit_weight is not None else self.density  # type: ignore[return-value]
 
     @property
     def shear_modulus(self) -> float:
         """G [Pa]."""
         if self.E is not None:
             return self.E / (2 * (1 + self.nu))
-        return self.G if self.G is not None else self.rho * self.Vs**2
+        return self.rho * self.Vs**2 if self.Vs is not None else self.G  # type: ignore[return-value]
 
     @property
     def young_modulus(self) -> float:
@@ -215,13 +216,14 @@ def _conflicts(spec: Spec) -> Any:
     """Rules between fields, each as 'field = value: rule'."""
     box, domain, time = spec.box, spec.domain, spec.time
     if box.depth + box.height >= domain.depth:
-        yield f"box.depth = {box.depth:g} m: box's floor at {box.depth + box.height:g} m must lie above domain.depth = {domain.depth:g} m"
+        floor = box.depth + box.height
+        yield f"box.depth = {box.depth:g} m: box's floor at {floor:g} m must lie above domain.depth = {domain.depth:g} m"
     if abs(box.offset) + box.width / 2 >= domain.width / 2:
         yield f"box.width = {box.width:g} m: box must lie inside domain.width = {domain.width:g} m"
     if 2 * box.wall >= min(box.width, box.height):
         yield f"box.wall = {box.wall:g} m: two walls must leave room inside {box.width:g} m x {box.height:g} m"
     bottoms = [layer.bottom for layer in spec.layer]
-    for i, (above, below) in enumerate(zip(bottoms, bottoms[1:], strict=False)):
+    for i, (above, below) in enumerate(pairwise(bottoms)):
         if below <= above:
             yield f"layer.{i + 2}.bottom = {below:g} m: must lie below the layer above it, which ends at {above:g} m"
     if time.duration < time.dt:
@@ -230,7 +232,7 @@ def _conflicts(spec: Spec) -> Any:
         yield f"time.duration = {time.duration:g} s: must be at most two million steps of time.dt = {time.dt:g} s"
     if time.newmark_beta < (time.newmark_gamma + 0.5) ** 2 / 4 - 1e-12:
         limit = (time.newmark_gamma + 0.5) ** 2 / 4
-        yield f"time.newmark_beta = {time.newmark_beta:g}: must be at least {limit:g}, or the scheme is not unconditionally stable"
+        yield f"time.newmark_beta = {time.newmark_beta:g}: must be at least {limit:g}, or the scheme is not always stable"
     if spec.supports.sides == "shear" and spec.gravity.self_weight:
         yield 'supports.sides = "shear": would carry the self-weight; choose tied, or gravity.self_weight = false'
     if spec.supports.sides == "shear" and spec.motion.vertical_record != "none":

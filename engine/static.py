@@ -21,7 +21,7 @@ def equilibrium(system: System, lanes: Lanes, loads: list[Floats], first_frequen
     """Static state of all lanes, and (LANES,) False where a lane has found none.
 
     loads : (n_dof, LANES) each, applied one after the other in proportional steps (weight, then pressure)
-    first_frequency : [Hz] of the bonded system, sets the proximal term eta M: small against every stiffness but of parts that float
+    first_frequency : [Hz] of the bonded system; sets the proximal term eta M, small against every stiffness but of floating parts
     """
     eta = 0.01 * (2 * np.pi * first_frequency) ** 2
     solver = _Proximal(system, eta)

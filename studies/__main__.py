@@ -94,7 +94,8 @@ def run_command(
     loaded = [_load(name) for name in names]
     paths = [out_file or Path("results") / f"{study.name}.nc" for study in loaded]
     _check_paths(paths)
-    rows, failed = [], False
+    rows: list[tuple[str, ...]] = []
+    failed = False
     for study, path in zip(loaded, paths, strict=True):
         ds, seconds = _run_one(study, path, workers, fresh)
         lost = failures(ds)
@@ -253,7 +254,7 @@ def _schema_lines() -> Iterator[str]:
         yield f"{last:<16} = {value:<16} # {'; '.join(part for part in (field.meaning, field.rule) if part)}"
     yield "\n[sweep]                        # a grid of any of these"
     yield 'p0 = [0, "1 MPa", { from = "2 MPa", to = "4 MPa", num = 3, spacing = "linear" }]    # or "log"'
-    yield "# a key is the dotted name (pressure.p0), that with underscores (damping_ratio), or the last part where it is unique (p0)"
+    yield "# a key is the dotted name (pressure.p0), with underscores (damping_ratio), or its last part where unique (p0)"
 
 
 if __name__ == "__main__":

@@ -91,5 +91,6 @@ def _short_waves(study: Study, model: Model) -> str:
         speed = np.sqrt(layer.shear_modulus / layer.rho)
         if inside.any() and heights[inside].max() > speed / highest / 6:
             limit = speed / 6 / heights[inside].max()
-            return f"layer {i + 1} has elements {in_words(heights[inside].max(), 'm')} high: it carries shear waves up to {limit:.3g} Hz well"
+            size = in_words(heights[inside].max(), "m")
+            return f"layer {i + 1} has elements {size} high: it carries shear waves up to {limit:.3g} Hz well"
     return ""

@@ -159,8 +159,8 @@ def _stacked(values: list[np.ndarray]) -> np.ndarray:
     """Arrays one after the other, padded with NaN where they are shorter than the longest."""
     shape = tuple(np.max([v.shape for v in values], axis=0)) if values[0].ndim else ()
     result = np.full((len(values), *shape), np.nan)
-    for i, value in enumerate(values):
-        result[(i, *(slice(n) for n in value.shape))] = value
+    for row, value in zip(result, values, strict=True):
+        row[tuple(slice(n) for n in value.shape)] = value
     return result
 
 

@@ -93,7 +93,7 @@ def nearest(name: str, known: list[str]) -> str:
 
 
 def resolve(name: str) -> Field | None:
-    """The field that a key of [sweep] names: dotted (layer.2.E), with underscores (damping_ratio), or its last part where unique."""
+    """The field that a key of [sweep] names: dotted (layer.2.E), with underscores (damping_ratio), or its last part if unique."""
     parts = name.split(".")
     if len(parts) == 3 and parts[0] == "layer" and parts[1].isdigit():
         general = resolve(f"layer.N.{parts[2]}")

@@ -251,7 +251,8 @@ def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) 
             ends.append(in_si(entry[key], field.unit or "1", unit_required=True))
         except ValueError as error:
             mistakes.append(f"{name}.{key} = {shown(entry[key])}: {error}")
-    num, spacing = entry.get("num"), entry.get("spacing", "linear")
+    num: Any = entry.get("num")
+    spacing = entry.get("spacing", "linear")
     if isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_CASES:
         mistakes.append(f"{name}.num = {shown(num)}: must be a whole number from 2 to {MOST_CASES:,}")
     if spacing not in ("linear", "log"):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,7 +19,7 @@ from .table import axes_of, cases_of, in_words
 WIDTH = 180 / 25.4
 """[inch]."""
 
-STYLE = {
+STYLE: dict[str, Any] = {
     "font.size": 8,
     "axes.titlesize": 8,
     "axes.labelsize": 8,
@@ -57,7 +58,7 @@ def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
         if len(axes) == 1 and done[axes[0]].dtype.kind in "fi" and done.sizes["case"] > 2:
             drawings["peaks"] = lambda: peaks_figure(done, axes[0])
     files = []
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         for name, draw in drawings.items():
             file = path.with_name(f"{path.stem}-{name}.png")
             draw().savefig(file)
@@ -96,7 +97,7 @@ def mesh_figure(ds: xr.Dataset) -> Figure:
     _layer_names(ax, corners, layer, structure)
     for name, x, y in zip(ds["point"].values, ds["point_x"].values, ds["point_y"].values, strict=True):
         ax.plot(x, y, "o", color="black", markersize=3.5, clip_on=False)
-        label = {"xytext": (4, 4), "textcoords": "offset points", "fontweight": "bold"}
+        label: dict[str, Any] = {"xytext": (4, 4), "textcoords": "offset points", "fontweight": "bold"}
         ax.annotate(str(name), (x, y), bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}, **label)
     ax.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     ax.autoscale_view()

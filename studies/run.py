@@ -16,7 +16,7 @@ from engine import Model, Spec, build_model, free_field, simulate_cases
 from .dataset import build_dataset, case_arrays
 from .plan import Study, load_study
 
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 Progress = Callable[[int], None]
 """Told how many case-steps have been done since it was last called."""

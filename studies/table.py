@@ -91,7 +91,7 @@ def _at(cases: xr.Dataset, axes: list[str], i: int) -> str:
 def _before_shaking(cases: xr.Dataset, axes: list[str]) -> str:
     closed = 100 * cases["closed_before_shaking"].values
     floor = cases["gap_before_shaking"].values[:, cases["joint_side"].values == "floor"]
-    lifted = (floor > 0).all(axis=1)
+    lifted = np.asarray((floor > 0).all(axis=1))
     if len(closed) == 1:
         return f"Before shaking {closed[0]:.0f} % of the joint is closed and the floor {'has lifted' if lifted[0] else 'bears'}."
     least, most = int(np.argmin(closed)), int(np.argmax(closed))

@@ -180,7 +180,7 @@ def _direct(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, u
 
 @kernel
 def _next_state(state, gap_n, normal, excess, forward):
-    """The state that follows from a solution in which this one may not hold: `excess` of shear over the Coulomb limit, slip `forward`."""
+    """The state that a solution calls for: `excess` of shear over the Coulomb limit, `forward` part of the slip."""
     if state == OPEN:
         return STICK if gap_n < 0.0 else OPEN
     if normal > 0.0:

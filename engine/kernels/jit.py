@@ -6,13 +6,14 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
 
 LANES = 16
 """Cases that march together. Every lane array is (rows, LANES) with the lane contiguous; short batches are padded."""
 
-FLAGS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
 """`contract` lets a product and a sum become one fused operation, the same one in every lane; nothing is reassociated and
 NaN and infinity keep their meaning."""
 
@@ -56,9 +57,9 @@ def kernel(function: Callable) -> Callable:
 
     numba fixes the folder when it decorates, so its setting is changed for that moment only: other packages keep theirs.
     """
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _DIRECTORY
+    config: Any = numba.config
+    before, config.CACHE_DIR = config.CACHE_DIR, _DIRECTORY
     try:
         return numba.njit(cache=True, **FLAGS)(function)
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before

@@ -1,7 +1,8 @@
 """The law of one joint point: no tension, Coulomb friction (D3).
 
-A point carries the force (lambda_n, lambda_s) [N] = tributary area times traction; k_n and k_s here are already multiplied by that
-area [N/m]. Opening is positive, so pressure is a negative lambda_n. `slip` is the tangential gap at which the point carries no shear.
+A point carries the force (lambda_n, lambda_s) [N] = tributary area times traction; k_n and k_s here are already multiplied by
+that area [N/m]. Opening is positive, so pressure is a negative lambda_n. `slip` is the tangential gap at which the point carries
+no shear.
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ INPUT, KINETIC, STRAIN, DAMPING, JOINT, JOINT_ELASTIC, FRICTION, JOINT_DAMPING =
 
 
 class Rates(NamedTuple):
-    """Newmark coefficients a0…a5 in Bathe's numbering (a6 and a7 are contained in them), with Rayleigh's alpha and beta (D5, D6)."""
+    """Newmark coefficients a0…a5 in Bathe's numbering, with Rayleigh's alpha and beta (D5, D6)."""
 
     a0: float
     a1: float
@@ -44,7 +44,7 @@ class Motion(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Joint state of every lane: gap, force of the law, force of the dashpots (LANES, 2 n_point); slip, state (LANES, n_point)."""
+    """Joints of every lane: gap, force of the law, force of the dashpots (LANES, 2 n_point); slip, state (LANES, n_point)."""
 
     gap: np.ndarray
     force: np.ndarray
@@ -81,8 +81,8 @@ def history(rates, loads, ground, motion, rhs):
 def solve_joints(G, gap_free, law, n_lane, max_rounds, work, slip, found, rounds, residual, source):
     """Joint solve of every lane, starting from the gaps, forces and states in `found`, which receives the solution.
 
-    G (1 or LANES, m, m) is the flexibility of all lanes or of each; gap_free (m, LANES); rounds, residual, source (LANES,). A lane
-    that did not converge has rounds -1.
+    G (1 or LANES, m, m) is the flexibility of all lanes or of each; gap_free (m, LANES); rounds, residual, source (LANES,).
+    A lane that did not converge has rounds -1.
     """
     for lane in range(n_lane):
         for i in range(gap_free.shape[0]):
@@ -217,7 +217,7 @@ def observe(values, standing, peaks, watched, record_holder):
 
 @kernel
 def observe_joints(contact, area, n_lane, time, slip_before, elastic_range, peaks, first_slip):
-    """Update peaks (4, LANES, n_point) of opening, slip, pressure, penetration, and when each closed point first slid (LANES, n_point).
+    """Update peaks (4, LANES, n_point) of opening, slip, pressure, penetration, and when each point first slid (LANES, n_point).
 
     A point has slid once its slip differs from that before the shaking by more than `elastic_range` (LANES, n_point), the
     tangential displacement it could take without sliding then.

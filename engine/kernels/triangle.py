@@ -55,7 +55,7 @@ def stiffness(xy, E, nu, thickness, K):
 
 @kernel
 def mass(xy, rho, thickness, lumped, m):
-    """Fill m (3, 3), the mass between corners, the same for x and y: consistent (rho A h/12)(1 + delta_ij) or row-sum lumped (D1)."""
+    """Fill m (3, 3), the mass between corners for x as for y: consistent (rho A h/12)(1 + delta_ij) or row-sum lumped (D1)."""
     total = rho * area(xy) * thickness
     for i in range(3):
         for j in range(3):
