@@ -107,7 +107,7 @@ class Condensed:
             G, self._gap, law, n_lane, MAX_ROUNDS, self._work, before.slip, found, self.rounds, self.residual, self.source
         )
         failed = self.rounds[:n_lane] < 0
-        for lane in np.flatnonzero(failed):
+        for lane in np.flatnonzero(failed).tolist():
             for name in ("gap", "force", "state"):
                 getattr(found, name)[lane] = getattr(before, name)[lane]
         self._apply(rhs, found.force if damping is None else found.force + damping.slope * found.gap + damping.offset)

@@ -157,10 +157,12 @@ def _on_grid(values: np.ndarray, time: np.ndarray, grid: np.ndarray) -> np.ndarr
 
 def _stacked(values: list[np.ndarray]) -> np.ndarray:
     """Arrays one after the other, padded with NaN where they are shorter than the longest."""
-    shape = tuple(np.max([v.shape for v in values], axis=0)) if values[0].ndim else ()
+    if values[0].ndim == 0:
+        return np.array(values)
+    shape = tuple(np.max([v.shape for v in values], axis=0))
     result = np.full((len(values), *shape), np.nan)
-    for row, value in zip(result, values, strict=True):
-        row[tuple(slice(n) for n in value.shape)] = value
+    for i, value in enumerate(values):
+        result[i][tuple(slice(n) for n in value.shape)] = value
     return result
 
 
