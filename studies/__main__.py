@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 import xarray as xr
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -25,6 +26,9 @@ from .table import failures, sentences
 from .table import table as table_of
 
 DONE, SOME_FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+TABLE_WIDTH = 96
+"""Columns that a table of results needs; narrower terminals wrap its lines."""
 
 app = typer.Typer(
     add_completion=False,
@@ -211,12 +215,23 @@ def table_command(
         except OSError as error:
             raise _refuse([f"{csv}: cannot be written: {error.strerror}"]) from None
         return
-    grid = Table(row_styles=["", "dim"])
+    grid = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for name in frame.columns:
-        grid.add_column(str(name), justify="right")
+        head, factor = _readable(str(name))
+        grid.add_column(escape(head), justify="right")
+        if frame[name].dtype.kind == "f":
+            frame[name] = [f"{factor * value:.3g}" for value in frame[name]]
     for row in frame.itertuples(index=False):
-        grid.add_row(*(f"{value:.4g}" if isinstance(value, float) else str(value) for value in row))
-    out.print(grid)
+        grid.add_row(*map(str, row))
+    Console(width=max(out.width, TABLE_WIDTH), highlight=False).print(grid)
+
+
+def _readable(column: str) -> tuple[str, float]:
+    """Head of a column in units that make short numbers, and the factor to them."""
+    for si, unit, factor in (("[m]", "[mm]", 1e3), ("[Pa]", "[MPa]", 1e-6), (" [1]", "", 1.0)):
+        if column.endswith(si):
+            return column.removesuffix(si) + unit, factor
+    return column, 1.0
 
 
 @app.command("list")

@@ -20,21 +20,28 @@ def cases_of(ds: xr.Dataset) -> xr.Dataset:
 
 
 def table(ds: xr.Dataset) -> pd.DataFrame:
-    """One row a case: the axes, how it ended, the peaks a designer asks for first. SI units, named in the columns."""
+    """One row a case: the axes, how it ended, the peaks a designer asks for first. SI units, named in the columns.
+
+    The racking ratio is peak racking over the free field's; `closed before` the share of the joint that bears before the shaking.
+    """
     cases = cases_of(ds)
-    columns = {name: cases[name].values for name in axes_of(ds)}
+    columns = {_with_unit(name, cases[name].attrs["units"]): cases[name].values for name in axes_of(ds)}
     columns |= {
         "status": cases["status"].values,
-        "closed before shaking [1]": cases["closed_before_shaking"].values,
-        "peak u_x at A [m]": cases["peak_displacement"].sel(point="A", component="x").values,
-        "peak racking [m]": cases["peak_racking"].values,
-        "racking over free field [1]": _ratio(cases),
-        "max opening [m]": cases["max_opening"].max("joint").values,
-        "max slip [m]": cases["max_slip"].max("joint").values,
-        "peak stress xx at C [Pa]": cases["peak_stress"].sel(point="C", stress_component="xx").values,
+        "closed before [1]": cases["closed_before_shaking"].values,
+        "u_x at A [m]": cases["peak_displacement"].sel(point="A", component="x").values,
+        "racking [m]": cases["peak_racking"].values,
+        "racking ratio [1]": _ratio(cases),
+        "opening [m]": cases["max_opening"].max("joint").values,
+        "slip [m]": cases["max_slip"].max("joint").values,
+        "stress xx at C [Pa]": cases["peak_stress"].sel(point="C", stress_component="xx").values,
         "energy error [1]": cases["energy_error"].values,
     }
     return pd.DataFrame(columns)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name} [{unit.replace('**', '')}]"
 
 
 def _ratio(cases: xr.Dataset) -> np.ndarray:
