@@ -48,11 +48,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    try:
-        app()
-    except KeyboardInterrupt:
-        err.print("Stopped; nothing was written.")
-        sys.exit(INTERRUPTED)
+    app()
 
 
 def _refuse(lines: list[str]) -> typer.Exit:
@@ -140,7 +136,12 @@ def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tupl
     )
     with Progress(*columns, console=err) as bar:
         task = bar.add_task(study.name, total=total)
-        ds = run_study(study, workers, lambda steps: bar.advance(task, steps))
+        try:
+            ds = run_study(study, workers, lambda steps: bar.advance(task, steps))
+        except KeyboardInterrupt:
+            bar.stop()
+            err.print(f"Stopped; {path} was not written.")
+            raise typer.Exit(INTERRUPTED) from None
         bar.update(task, completed=total)
     try:
         write_dataset(ds, path)
