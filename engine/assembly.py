@@ -75,6 +75,7 @@ class Constraints:
         master = self.master.copy()
         for component in components:
             master[slaves, component] = master[masters, component]
+            master[:, component] = master[master[:, component], component]  # nodes tied to a slave follow it
         return replace(self, master=master)
 
 

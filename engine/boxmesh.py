@@ -171,18 +171,30 @@ def _depth_lines(spec: Spec) -> tuple[Floats, int, int]:
     box, options = spec.box, spec.mesh
     upright = Grading(options.first, options.growth, options.largest_height)
     roof, floor = box.depth, box.depth + box.height
-    bounds = [layer.bottom for layer in spec.layer[:-1] if layer.bottom < spec.domain.depth]
+    bounds = [layer.bottom for layer in spec.layer[:-1]]
     above = _breaks([0.0, roof], bounds)
     inside = _breaks([roof, roof + box.wall, roof + box.height / 2, floor - box.wall, floor], bounds)
-    below = _breaks([floor, spec.domain.depth], bounds)
+    below = [floor, *(z for z in bounds if z > floor * (1 + 1e-9))]
     upper = [0.0] + [d for a, b in pairwise(sorted(roof - z for z in above)) for d in upright.between(a, b)]
-    lower = [d for a, b in pairwise(z - floor for z in below[:-1]) for d in upright.between(a, b)]
-    lower += upright.outwards(below[-2] - floor, below[-1] - floor)
+    lower = _down_to(spec.domain.depth - floor, [z - floor for z in below], upright)
     middle = [z for a, b in pairwise(inside) for z in np.linspace(a, b, 1 + _box_elements(a, b, box, options))[1:]]
     lines = [roof - d for d in reversed(upper)] + middle + [floor + d for d in lower]
     depths = np.array(lines)
     depths[0], depths[-1] = 0.0, spec.domain.depth
     return depths, len(upper) - 1, len(upper) - 1 + len(middle)
+
+
+def _down_to(end: float, bounds: list[float], grading: Grading) -> list[float]:
+    """Lines below the box down to `end`, by distance from it: those of a deeper domain, cut; layer boundaries stay lines."""
+    lines = [0.0]
+    for above, below in pairwise(bounds):
+        lines += grading.between(above, below)
+    if lines[-1] < end:
+        return [*lines[1:], *grading.outwards(lines[-1], end)]
+    kept = [d for d in lines if d < end * (1 - 1e-9)]
+    if len(kept) > 1 and kept[-1] not in bounds and end - kept[-1] < SLIVER * (kept[-1] - kept[-2]):
+        kept.pop()
+    return [*kept[1:], end]
 
 
 def _box_elements(top: float, bottom: float, box: Box, options: MeshOptions) -> int:

@@ -78,7 +78,7 @@ class Mesh:
         parts = edges[..., 0] * to_point[..., 1] - edges[..., 1] * to_point[..., 0]
         barycentric = np.roll(parts, -1, axis=1) / (2 * self.areas()[:, None])
         best = int(np.argmax(barycentric.min(axis=1)))
-        if barycentric[best].min() < -1e-9:
+        if not barycentric[best].min() >= -1e-9:
             raise MeshError(f"probe ({x:g}, {y:g}): lies outside the mesh")
         return Probe(x, y, self.triangles[best], barycentric[best], np.array([best]), np.ones(1))
 
@@ -130,8 +130,11 @@ def _check(mesh: Mesh) -> None:
     worst = int(np.argmin(areas))
     _require(areas[worst] > 0, f"triangles[{worst}]: area {areas[worst]:g}, must run counter-clockwise with an area above zero")
     for nodes, name in ((mesh.joints[:, [0, 1]], "1-2"), (mesh.joints[:, [3, 2]], "4-3")):
-        same = np.allclose(mesh.nodes[nodes], mesh.nodes[mesh.joints[:, [0, 1]]])
-        _require(same, f"joints: side {name} must lie on the other, 3 over 2 and 4 over 1")
+        ends = mesh.nodes[mesh.joints[:, [0, 1]]]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        _require((length > 0).all(), "joints: corners 1 and 2 must lie apart")
+        apart = np.linalg.norm(mesh.nodes[nodes] - ends, axis=2).max(axis=1)
+        _require((apart <= 1e-6 * length).all(), f"joints: side {name} must lie on the other, 3 over 2 and 4 over 1")
     unused = np.setdiff1d(np.arange(n), mesh.triangles)
     attached = np.intersect1d(unused, np.concatenate([mesh.joints.ravel(), *mesh.boundaries.values()]).astype(int))
     _require(len(unused) == len(attached), f"nodes[{unused[0] if len(unused) else 0}]: belongs to no triangle")

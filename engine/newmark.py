@@ -132,6 +132,7 @@ class Stepper:
         path[0][:, 0], path[1][:, 0] = ground[:, lane], ground_end[:, lane]
         for times in range(1, MAX_HALVINGS + 1):
             stepper, trial, parts = self.halved(times), start.copy(), 2**times
+            stepper.condensed.forget(0)  # its factor may be another lane's
             at = [path[0] + (path[1] - path[0]) * i / parts for i in range(parts + 1)]
             if all(stepper._part(trial, alone, *ends) for ends in pairwise(at)):
                 state.put(lane, trial)

@@ -177,10 +177,10 @@ class _Run:
         if finite[:n].all() and not report.halved.any():
             return
         for lane in np.flatnonzero(self.alive):
-            if report.failed[lane]:
+            if report.failed[lane] and not np.isnan(report.residual[lane]):
                 text = f"joint states not found at t = {time:g} s, down to a step of dt/64; residual {report.residual[lane]:.1e}"
                 self._drop(int(lane), Status.NOT_CONVERGED, text)
-            elif not finite[lane]:
+            elif report.failed[lane] or not finite[lane]:
                 self._drop(int(lane), Status.NON_FINITE, f"a value is no longer finite at t = {time:g} s")
             elif report.halved[lane]:
                 self.status[lane] = Status.SUBSTEPS

@@ -9,6 +9,9 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
 
+_NO_UNIT = re.compile(r"[\d)]\s*(\*\*|\^)|\d{3}")
+"""Powers of numbers and of brackets, long numbers: sums to be worked out, not units."""
+
 
 @cache
 def _registry() -> Any:
@@ -22,9 +25,15 @@ def _factor(written: str, wanted: str) -> float:
     """What one `written` unit is in `wanted` units; ValueError where it is no such unit."""
     import pint
 
+    if _NO_UNIT.search(written):
+        raise ValueError(f"unit {written!r} is not known; must be a unit like {wanted}")
     try:
         unit = _registry().parse_units(written)
+        if wanted == "Hz" and "radian" in str(_registry().get_base_units(unit)[1]):
+            raise ValueError(f"must be a frequency in Hz, {written} is an angular one; divide by 2 pi")
         return float(_registry().Quantity(1.0, unit).to(wanted).magnitude)
+    except ValueError:
+        raise
     except pint.DimensionalityError:
         raise ValueError(f"must be a quantity in {wanted} or a unit like it, {written} is not") from None
     except Exception:  # pint passes on whatever its parser met
@@ -43,11 +52,13 @@ def in_si(value: Any, unit: str, unit_required: bool) -> float:
             raise ValueError(f'must be a number and a unit, as in "2.5 {unit}"' if unit != "1" else "must be a number")
         number, written = float(match[1]), (match[2] or "")
     else:
-        number, written = float(value), ""
+        number, written = float(value) if abs(value) < 1e300 else math.inf, ""
+    if written and math.isfinite(number):
+        number *= _factor(written, "dimensionless" if unit == "1" else unit)
     if not math.isfinite(number):
         raise ValueError("must be finite")
     if written:
-        return number * _factor(written, "dimensionless" if unit == "1" else unit)
+        return number
     if unit_required and unit != "1" and number != 0.0:
         raise ValueError(f'needs a unit, as in "{number:g} {unit}"')
     return number

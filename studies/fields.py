@@ -85,10 +85,11 @@ def _text(default: Any, unit: str) -> str:
 
 def nearest(name: str, known: list[str]) -> str:
     """' Did you mean x?' where a known name is like this one, otherwise nothing."""
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    leaf = name.rsplit(".", 1)[-1]
+    by_leaf = {other.rsplit(".", 1)[-1]: other for other in reversed(known)}
+    close = [by_leaf[leaf]] if leaf in by_leaf else difflib.get_close_matches(name, known, n=1, cutoff=0.6)
     if not close:
-        by_leaf = {other.rsplit(".", 1)[-1]: other for other in known}
-        close = [by_leaf[leaf] for leaf in difflib.get_close_matches(name.rsplit(".", 1)[-1], list(by_leaf), n=1, cutoff=0.6)]
+        close = [by_leaf[other] for other in difflib.get_close_matches(leaf, list(by_leaf), n=1, cutoff=0.6)]
     return f"; did you mean {close[0]}?" if close else ""
 
 
@@ -96,12 +97,12 @@ def resolve(name: str) -> Field | None:
     """The field that a key of [sweep] names: dotted (layer.2.E), with underscores (damping_ratio), or its last part if unique."""
     parts = name.split(".")
     if len(parts) == 3 and parts[0] == "layer" and parts[1].isdigit():
-        general = resolve(f"layer.N.{parts[2]}")
+        general = next((field for field in catalogue() if field.name == f"layer.N.{parts[2]}"), None)
         return None if general is None else Field(name, general.unit, general.rule, general.default, general.meaning)
-    fields = catalogue()
-    for key in (lambda f: f.name, lambda f: f.name.replace(".", "_")):
-        for field in fields:
-            if key(field) == name:
-                return field
-    same_leaf = [field for field in fields if field.label == name and field.path[0] != "layer"]
-    return same_leaf[0] if len(same_leaf) == 1 else None
+    same_leaf = []
+    for field in catalogue():
+        if field.path[0] != "layer" and name in (field.name, field.name.replace(".", "_")):
+            return field
+        if field.label == name:
+            same_leaf.append(field)
+    return same_leaf[0] if len(same_leaf) == 1 and same_leaf[0].path[0] != "layer" else None

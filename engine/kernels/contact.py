@@ -2,8 +2,9 @@
 
 Unknowns are the forces of closed points, which keeps the system well conditioned however stiff the joint: a closed point adds
 1/k to the diagonal. The states of the last step are tried first, with the factor kept from then. Where a state does not hold,
-the solution itself says what comes next (a Newton step on the states); Newton can cycle, so every few rounds block Gauss-Seidel
-sweeps, which cannot, propose states instead, more of them each time.
+the solution itself says what comes next (a Newton step on the states); Newton can cycle, so every second time block Gauss-Seidel
+sweeps propose states instead: by turns from the direct solution brought back onto the law, which has the rigid motions right,
+and on from the last sweep, which cannot cycle; twice as many sweeps each time.
 """
 
 from typing import NamedTuple
@@ -15,8 +16,9 @@ from .jit import kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
 
 EQUATION_TOLERANCE = 1e-12  # of D9
+UNIT_ROUNDOFF = 2.0**-53
 STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep the state they have
-NEWTON_ROUNDS = 8  # direct solves between sweeps
+NEWTON_ROUNDS = 2  # direct solves between sweeps
 FIRST_SWEEPS = 8  # sweeps of the first time, doubled every time
 
 
@@ -210,6 +212,30 @@ def _revise(g, lam, slip, k_s, mu, g_tol, lam_tol, state):
 
 
 @kernel
+def _project(force, mu, swept):
+    """Forces brought back onto the law's cone (D3), for sweeps to start from."""
+    for p in range(mu.shape[0]):
+        normal = min(force[2 * p], 0.0)
+        swept[2 * p] = normal
+        swept[2 * p + 1] = max(mu[p] * normal, min(-mu[p] * normal, force[2 * p + 1]))
+
+
+@kernel
+def _rounding(G, g_free, lam, product):
+    """Relative residual that the rounding of G lambda alone can cause; where G is nearly singular it exceeds the tolerance."""
+    total = free = scale = 0.0
+    for i in range(lam.shape[0]):
+        row = 0.0
+        for j in range(lam.shape[0]):
+            row += abs(G[i, j] * lam[j])
+        total += row**2
+        free += g_free[i] ** 2
+        scale += product[i] ** 2
+    scale = max(free, scale)
+    return 0.0 if scale == 0.0 else lam.shape[0] * UNIT_ROUNDOFF * np.sqrt(total / scale)
+
+
+@kernel
 def _sweep(G, g_free, k_n, k_s, mu, slip, lam, proposal):
     """One block Gauss-Seidel sweep over the points: lam and the proposed states are updated in place."""
     for p in range(proposal.shape[0]):
@@ -244,16 +270,20 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     work.swept[:] = lam
     proposal[:] = state
     residual, sweeps = np.inf, FIRST_SWEEPS
+    if not np.isfinite(np.sum(g_free)):
+        return -1, np.nan
     for attempt in range(1, max_rounds + 1):
         residual = _direct(G, g_free, k_n, k_s, mu, slip, proposal, g, lam, lu, pivot, factored, work.unknown, work.product)
         if not np.isfinite(residual):
             break
         work.tried[:] = proposal
         held = _revise(g, lam, slip, k_s, mu, g_tol, STATE_TOLERANCE * _largest(lam), proposal)
-        if held and residual <= EQUATION_TOLERANCE:
+        if held and residual <= max(EQUATION_TOLERANCE, _rounding(G, g_free, lam, work.product)):
             state[:] = work.tried
             return attempt, residual
-        if attempt % NEWTON_ROUNDS == 0:
+        if attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
+            if attempt % (2 * NEWTON_ROUNDS) != 0:
+                _project(lam, mu, work.swept)
             for _ in range(sweeps):
                 _sweep(G, g_free, k_n, k_s, mu, slip, work.swept, proposal)
             sweeps *= 2
