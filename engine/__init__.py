@@ -6,9 +6,10 @@ lanes. All arrays are in SI, or in any consistent units where a mesh is built fr
 
 from .assembly import Constraints, JointMaterial, JointPoints, Material, System, build_system
 from .boxmesh import BoxMesh, box_mesh, column_mesh
+from .column import FreeField, free_field
 from .kernels.jit import LANES
 from .mesh import Mesh, MeshError, Probe
-from .model import Model, build_model, free_field, newmark_of, simulate_cases
+from .model import Model, build_model, newmark_of, simulate_cases
 from .modes import natural_frequencies, rayleigh_coefficients
 from .motion import GroundMotion, MotionError, base_motion, read_at2
 from .newmark import Newmark, Rayleigh, Stepper
@@ -24,6 +25,7 @@ __all__ = [
     "BoxMesh",
     "Constraints",
     "ConvergenceError",
+    "FreeField",
     "GroundMotion",
     "JointMaterial",
     "JointPoints",

@@ -1,11 +1,9 @@
-"""The layered ground without the box, as one column: the free field, and motions carried from one depth to another."""
+"""The layered ground without the box, as one column: the free field."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from .assembly import Constraints, System, build_system
 from .boxmesh import column_mesh
@@ -45,33 +43,3 @@ def free_field(model: Model, motions: Sequence[Floats]) -> FreeField:
     points = response.recorder.displacement(response.values)
     racking = points[:, :, 0, 0] - points[:, :, 1, 0]
     return FreeField(racking[:, :: spec.output.every], np.abs(racking).max(axis=1))
-
-
-def carried_to_base(model: Model, ground: Floats, depth: float) -> Floats:
-    """Motion of the model's base that makes `ground` the free field's own motion at `depth` [m]; both (n_step + 1, 2) [m/s²].
-
-    In the frequency domain on the model's column: base = ground / T, T the ratio of total accelerations at that depth and at
-    the base. The layers above `depth` then move as if `ground` drove them, however deep the base lies.
-    """
-    system = column_system(model, {"reference": -depth})
-    n = 2 * len(ground)
-    omega = 2 * np.pi * np.fft.rfftfreq(n, model.spec.time.dt)
-    spectrum = np.fft.rfft(ground, n, axis=0)
-    for direction in range(2):
-        if ground[:, direction].any():
-            spectrum[:, direction] /= _transfer(system, model.rayleigh, direction, omega)
-    return np.fft.irfft(spectrum, n, axis=0)[: len(ground)]
-
-
-def _transfer(system: System, rayleigh: Rayleigh, direction: int, omega: Floats) -> np.ndarray:
-    """Total acceleration at the probe over that of the base, (n_omega,): 1 + omega² (K + i omega C - omega² M)⁻¹ M r."""
-    (probe,) = system.mesh.probes.values()
-    reading = np.zeros(2 * len(system.mesh.nodes))
-    np.add.at(reading, 2 * probe.nodes + direction, probe.node_weights)
-    observed = reading @ system.expand
-    C = rayleigh.alpha * system.M + rayleigh.beta * system.K
-    result = np.ones(len(omega), dtype=complex)
-    for i, w in enumerate(omega[1:], start=1):
-        dynamic = sp.csc_array(system.K + 1j * w * C - w**2 * system.M)
-        result[i] += w**2 * (observed @ splu(dynamic).solve(system.inertia[direction].astype(complex)))
-    return result

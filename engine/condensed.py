@@ -7,14 +7,14 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from .assembly import System, rows
-from .kernels.contact import Law, Workspace, workspace
 from .kernels.jit import LANES
 from .kernels.march import Contact, solve_joints
 from .kernels.sparse import Factor, Rows, backward, forward, product, subtract_transposed_product
+from .kernels.states import Law, Workspace, workspace
 from .mesh import Flags, Floats, MeshError
 
 MAX_ROUNDS = 26
-"""Direct solves a joint solve may take; the sweeps between them add up to some 30,000 by then. 22 is the most seen."""
+"""Direct solves a joint solve may take; the sweeps between them add up to some 30,000 by then."""
 
 
 def factorise(matrix: sp.sparray, n_interior: int) -> Factor:

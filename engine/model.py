@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import Constraints, JointMaterial, Material, System, build_system
-from .boxmesh import box_mesh, column_mesh
-from .mesh import Floats, Mesh
+from .boxmesh import box_mesh
+from .mesh import Floats
 from .modes import natural_frequencies, rayleigh_coefficients
 from .newmark import Newmark, Rayleigh, Stepper
 from .simulate import Response, simulate
@@ -95,31 +95,3 @@ def simulate_cases(
     stepper = Stepper(model.system, newmark_of(model.spec), model.rayleigh)
     every = model.spec.output.every
     return simulate(stepper, lanes, static, model.frequencies[0], every=every, progress=progress)
-
-
-@dataclass(frozen=True)
-class FreeField:
-    """Racking of the ground without the box, between the depths of roof and invert: (n_lane, n_time) and peak (n_lane,) [m]."""
-
-    racking: Floats
-    peak: Floats
-
-
-def free_field(model: Model, motions: Sequence[Floats]) -> FreeField:
-    """The layered column under the same motions, on the model's own lines, with its damping coefficients and time steps."""
-    spec = model.spec
-    mesh = column_mesh(_side_lines(model.system.mesh), spec.layer)
-    roof, invert = -spec.box.depth, -spec.box.depth - spec.box.height
-    mesh = mesh.with_probe("roof", 0.0, roof).with_probe("invert", 0.0, invert)
-    held = Constraints.of_sides(mesh, "tied")
-    system = build_system(mesh, materials(spec), (), held, lumped=spec.mesh.mass == "lumped")
-    lanes = Lanes.of([np.zeros(system.n_dof)] * len(motions), [system.joint_law()] * len(motions), list(motions))
-    stepper = Stepper(system, newmark_of(spec), Rayleigh(model.rayleigh.alpha, model.rayleigh.beta))
-    response = simulate(stepper, lanes, [], natural_frequencies(system, 1)[0])
-    points = response.recorder.displacement(response.values)
-    racking = points[:, :, 0, 0] - points[:, :, 1, 0]
-    return FreeField(racking[:, :: spec.output.every], np.abs(racking).max(axis=1))
-
-
-def _side_lines(mesh: Mesh) -> Floats:
-    return mesh.nodes[mesh.boundaries["left"], 1]

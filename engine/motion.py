@@ -106,7 +106,8 @@ def _values(name: str, count: int, dt: float, lines: list[str]) -> GroundMotion:
         raise MotionError(f"{name}: {words[int(np.argmax(np.isnan(values)))][:20]!r} is not a number")
     if len(values) != count:
         raise MotionError(f"{name}: holds {len(values)} values, its header says {count}")
-    return GroundMotion(name, dt, values * G_OF_RECORDS)
+    with np.errstate(over="ignore"):
+        return GroundMotion(name, dt, values * G_OF_RECORDS)
 
 
 def base_motion(
@@ -125,5 +126,8 @@ def base_motion(
         if peak is not None:
             factor = values.scale_to(peak)
         n = min(len(values.acceleration), len(result))
-        result[:n, column] = values.acceleration[:n] * (factor * description.scale)
+        with np.errstate(over="ignore"):
+            result[:n, column] = values.acceleration[:n] * (factor * description.scale)
+        if not np.isfinite(result).all():
+            raise MotionError(f"{record.name}: is not finite when scaled")
     return result

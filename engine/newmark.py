@@ -85,6 +85,8 @@ class Stepper:
 
     def start(self, state: State, lanes: Lanes, ground: Floats) -> None:
         """Complete a static state: images under M and K, and the first acceleration from (D4); velocities are zero."""
+        for lane in range(LANES):
+            self.condensed.forget(lane)  # its factor may be that of other joints
         motion, contact = state.motion, state.contact
         K = rows(self.system.K)
         product(self._M, motion.u, motion.Mu)

@@ -17,6 +17,9 @@ from .recorder import Recorder
 from .state import Lanes, State
 from .static import equilibrium
 
+RESOLVED = 1e-3
+"""The account is read against at least this part of what the static stage stored: 1e-9 of it is the rounding of that store."""
+
 OPENING, SLIP, PRESSURE, PENETRATION = range(4)
 """Rows of Response.joint_peaks."""
 
@@ -213,7 +216,8 @@ class _Run:
     def response(self) -> Response:
         """Everything kept, lane first, with failed lanes emptied."""
         n = self.lanes.n_lane
-        scale = np.where(self.account[2] > 0, self.account[2], 1.0)
+        scale = np.maximum(self.account[2], RESOLVED * self.start_energy.sum(axis=0))
+        scale[scale == 0.0] = 1.0
         failed = self.status[:n] >= Status.NOT_CONVERGED
         expand = self.system.expand
 

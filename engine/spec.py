@@ -6,6 +6,7 @@ pressure grows linearly with depth from zero at the surface.
 """
 
 from itertools import pairwise
+from math import log
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -121,7 +122,9 @@ class Damping(Section):
         tuple[Quantity("Hz", "frequency", gt=0), Quantity("Hz", "frequency", gt=0)] | None,
         Field(description="the two frequencies; left out: the first two of the bonded system"),
     ] = None
-    joints: Annotated[bool, Field(description="whether beta acts on the joints' stiffness too, as in the source")] = False
+    joints: Annotated[
+        bool, Field(strict=True, description="whether beta acts on the joints' stiffness too, as in the source")
+    ] = False
 
 
 class Time(Section):
@@ -136,9 +139,13 @@ class Time(Section):
 class MeshOptions(Section):
     """How fine the mesh is."""
 
-    wall_elements: Annotated[int, Field(ge=1, le=20, description="elements through a wall")] = 2
-    roof_elements: Annotated[int, Field(ge=2, le=200, multiple_of=2, description="elements along the clear width")] = 8
-    side_elements: Annotated[int, Field(ge=2, le=200, multiple_of=2, description="elements along the clear height")] = 6
+    wall_elements: Annotated[int, Field(strict=True, ge=1, le=20, description="elements through a wall")] = 2
+    roof_elements: Annotated[
+        int, Field(strict=True, ge=2, le=200, multiple_of=2, description="elements along the clear width")
+    ] = 8
+    side_elements: Annotated[
+        int, Field(strict=True, ge=2, le=200, multiple_of=2, description="elements along the clear height")
+    ] = 6
     first: Quantity("m", "size of the ground elements at the box", gt=0) = 0.5
     growth: Quantity("1", "growth of their size, an element to the next, away from it", ge=1, le=4) = 1.2
     largest_width: Quantity("m", "largest width of a ground element", gt=0) = 1.0
@@ -171,14 +178,16 @@ class Supports(Section):
 class Gravity(Section):
     """Self-weight of box and ground."""
 
-    self_weight: Annotated[bool, Field(description="whether it acts")] = True
+    self_weight: Annotated[bool, Field(strict=True, description="whether it acts")] = True
     acceleration: Quantity("m/s**2", "gravity", gt=0) = 9.81
 
 
 class Output(Section):
     """What is kept."""
 
-    every: Annotated[int, Field(ge=1, le=100_000, description="histories keep every so many steps; peaks see all")] = 2
+    every: Annotated[
+        int, Field(strict=True, ge=1, le=100_000, description="histories keep every so many steps; peaks see all")
+    ] = 2
     points: Annotated[
         dict[str, tuple[Quantity("m", "x"), Quantity("m", "y")]],
         Field(description="further points: name = [x, y], x from the middle of the domain, y up from the surface"),
@@ -212,6 +221,16 @@ class Spec(Section):
         return self
 
 
+MOST_CELLS = 500_000
+
+
+def _about(mesh: MeshOptions, largest: float, length: float) -> float:
+    """About how many elements the grading puts along `length`."""
+    slope = mesh.growth - 1
+    graded = length / mesh.first if slope == 0 else log(1 + slope * length / mesh.first) / slope
+    return max(graded, length / largest)
+
+
 def _conflicts(spec: Spec) -> Any:
     """Rules between fields, each as 'field = value: rule'."""
     box, domain, time = spec.box, spec.domain, spec.time
@@ -219,13 +238,19 @@ def _conflicts(spec: Spec) -> Any:
         floor = box.depth + box.height
         yield f"box.depth = {box.depth:g} m: box's floor at {floor:g} m must lie above domain.depth = {domain.depth:g} m"
     if abs(box.offset) + box.width / 2 >= domain.width / 2:
-        yield f"box.width = {box.width:g} m: box must lie inside domain.width = {domain.width:g} m"
+        field, value = ("box.offset", box.offset) if box.width < domain.width else ("box.width", box.width)
+        yield f"{field} = {value:g} m: box must lie inside domain.width = {domain.width:g} m"
     if 2 * box.wall >= min(box.width, box.height):
         yield f"box.wall = {box.wall:g} m: two walls must leave room inside {box.width:g} m x {box.height:g} m"
     bottoms = [layer.bottom for layer in spec.layer]
     for i, (above, below) in enumerate(pairwise(bottoms)):
         if below <= above:
             yield f"layer.{i + 2}.bottom = {below:g} m: must lie below the layer above it, which ends at {above:g} m"
+    mesh = spec.mesh
+    columns = _about(mesh, mesh.largest_width, domain.width) + mesh.roof_elements + 2 * mesh.wall_elements
+    rows = _about(mesh, mesh.largest_height, domain.depth) + mesh.side_elements + 2 * mesh.wall_elements
+    if columns * rows > MOST_CELLS:
+        yield f"mesh.first = {mesh.first:g} m: makes about {columns * rows:.2g} cells of the mesh; must be at most {MOST_CELLS:,}"
     if time.duration < time.dt:
         yield f"time.duration = {time.duration:g} s: must be at least one time.dt = {time.dt:g} s"
     elif time.duration / time.dt > 2e6:

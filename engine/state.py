@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import System
-from .kernels.contact import Law
 from .kernels.jit import LANES
 from .kernels.march import Contact, Motion
+from .kernels.states import Law
 from .mesh import Floats
 
 

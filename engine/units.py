@@ -29,15 +29,15 @@ def _factor(written: str, wanted: str) -> float:
         raise ValueError(f"unit {written!r} is not known; must be a unit like {wanted}")
     try:
         unit = _registry().parse_units(written)
-        if wanted == "Hz" and "radian" in str(_registry().get_base_units(unit)[1]):
-            raise ValueError(f"must be a frequency in Hz, {written} is an angular one; divide by 2 pi")
-        return float(_registry().Quantity(1.0, unit).to(wanted).magnitude)
-    except ValueError:
-        raise
+        factor = float(_registry().Quantity(1.0, unit).to(wanted).magnitude)
+        angular = wanted == "Hz" and "radian" in str(_registry().get_base_units(unit)[1])
     except pint.DimensionalityError:
         raise ValueError(f"must be a quantity in {wanted} or a unit like it, {written} is not") from None
     except Exception:  # pint passes on whatever its parser met
         raise ValueError(f"unit {written!r} is not known; must be a unit like {wanted}") from None
+    if angular:
+        raise ValueError(f"must be a frequency in Hz, {written} is an angular one; divide by 2 pi")
+    return factor
 
 
 def in_si(value: Any, unit: str, unit_required: bool) -> float:

@@ -22,13 +22,13 @@ from .fields import catalogue
 from .messages import StudyError
 from .plan import Study, load_study, shipped_studies
 from .run import run_study, write_dataset
-from .table import failures, sentences
+from .table import axes_of, failures, sentences
 from .table import table as table_of
 
 DONE, SOME_FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
-TABLE_WIDTH = 96
-"""Columns that a table of results needs; narrower terminals wrap its lines."""
+WIDEST_COLUMN = 30
+"""Characters that a column of results may need; the table is as wide as its content, narrower terminals wrap its lines."""
 
 app = typer.Typer(
     add_completion=False,
@@ -91,9 +91,9 @@ def run_command(
         raise _refuse(["run: name a study, or say --all (coralquake list shows what is shipped)"])
     if out_file is not None and len(names) > 1:
         raise _refuse([f"--out {out_file}: is for one study, {len(names)} are named"])
-    loaded = [_load(name) for name in names]
+    loaded = _load_all(names)
     paths = [out_file or Path("results") / f"{study.name}.nc" for study in loaded]
-    _check_paths(paths)
+    _check_paths(paths, names)
     rows: list[tuple[str, ...]] = []
     failed = False
     for study, path in zip(loaded, paths, strict=True):
@@ -110,8 +110,26 @@ def run_command(
     raise typer.Exit(SOME_FAILED if failed else DONE)
 
 
-def _check_paths(paths: list[Path]) -> None:
+def _load_all(names: list[str]) -> list[Study]:
+    """All studies, or the mistakes of all of them."""
+    loaded, mistakes = [], []
+    for name in names:
+        try:
+            loaded.append(load_study(name))
+        except StudyError as error:
+            mistakes += error.mistakes
+    if mistakes:
+        raise _refuse(mistakes)
+    return loaded
+
+
+def _check_paths(paths: list[Path], sources: list[str]) -> None:
     wrong = [f"{path}: is a folder, must be a file" for path in paths if path.is_dir()]
+    places = [path.resolve() for path in paths]
+    read = {Path(source).resolve() for source in sources}
+    wrong += [f"{path}: is a study file, results would overwrite it" for path in paths if path.resolve() in read]
+    twice = dict.fromkeys(path for path, place in zip(paths, places, strict=True) if places.count(place) > 1)
+    wrong += [f"{path}: two of the studies would write it; run one with --out" for path in twice]
     for folder in dict.fromkeys(path.parent for path in paths):
         existing = next((p for p in (folder, *folder.parents) if p.exists()), Path())
         if not existing.is_dir():
@@ -138,6 +156,9 @@ def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tupl
         task = bar.add_task(study.name, total=total)
         try:
             ds = run_study(study, workers, lambda steps: bar.advance(task, steps))
+        except StudyError as error:
+            bar.stop()
+            raise _refuse(error.mistakes) from None
         except KeyboardInterrupt:
             bar.stop()
             err.print(f"Stopped; {path} was not written.")
@@ -209,22 +230,23 @@ def table_command(
     results: ResultFile, csv: Annotated[Path | None, typer.Option(help="write the table to this file instead")] = None
 ) -> None:
     """Print one row a case: axes, status, peaks."""
-    frame = table_of(_open(results))
+    ds = _open(results)
+    frame = table_of(ds)
     if csv is not None:
         try:
             frame.to_csv(csv, index=False)
         except OSError as error:
-            raise _refuse([f"{csv}: cannot be written: {error.strerror}"]) from None
+            raise _refuse([f"{csv}: cannot be written: {error.strerror or error}"]) from None
         return
     grid = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for name in frame.columns:
-        head, factor = _readable(str(name))
+        head, factor = (str(name), 1.0) if str(name).startswith(tuple(axes_of(ds))) else _readable(str(name))
         grid.add_column(escape(head), justify="right")
         if frame[name].dtype.kind == "f":
             frame[name] = [f"{factor * value:.3g}" for value in frame[name]]
     for row in frame.itertuples(index=False):
         grid.add_row(*map(str, row))
-    Console(width=max(out.width, TABLE_WIDTH), highlight=False).print(grid)
+    Console(width=max(out.width, WIDEST_COLUMN * len(frame.columns)), highlight=False).print(grid)
 
 
 def _readable(column: str) -> tuple[str, float]:
@@ -264,7 +286,8 @@ def _schema_lines() -> Iterator[str]:
             yield (
                 "\n[[layer]]                      # once for every layer, from the top" if table == "layer.N" else f"\n[{table}]"
             )
-        value = f'"{field.default}"' if field.unit and field.default != "–" else field.default
+        plain = field.default in ("true", "false", "–") or field.default.lstrip("-")[:1].isdigit()
+        value = field.default if plain and not (field.unit and field.default != "–") else f'"{field.default}"'
         if field.default == "–" and field.unit:
             value = f'"… {field.unit}"'
         yield f"{last:<16} = {value:<16} # {'; '.join(part for part in (field.meaning, field.rule) if part)}"

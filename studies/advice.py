@@ -52,33 +52,39 @@ def _facts(study: Study, model: Model, workers: int) -> list[tuple[str, str]]:
         ("unknowns", f"{model.system.n_dof} degrees of freedom, {len(model.system.points)} joint points"),
         ("frequencies", ", ".join(f"{f:.4g}" for f in model.frequencies[:4]) + " Hz (joints closed)"),
         ("bending bound", f"walls in T3 are at most {bending_bound(model.spec):.2f} times too stiff in bending"),
-        ("uplift / weight", " to ".join(dict.fromkeys(f"{v:.3g}" for v in _uplift_range(study, model)))),
+        ("uplift / weight", " to ".join(dict.fromkeys(f"{v:.3g}" for v in _uplift_range(study)))),
     ]
 
 
-def _uplift_range(study: Study, model: Model) -> tuple[float, float]:
-    first = study.batches[0].cases
-    values = [uplift_over_weight(model, study.cases[i]) for i in first]
+def _uplift_range(study: Study) -> tuple[float, float]:
+    pressures = {(spec.pressure, spec.box, spec.gravity.acceleration): spec for spec in study.cases}
+    values = [uplift_over_weight(spec) for spec in pressures.values()]
     return min(values), max(values)
 
 
 def _warnings(study: Study, model: Model) -> list[str]:
-    spec, first = model.spec, model.frequencies[0]
+    first = model.frequencies[0]
     found = []
     longest = max(case.time.dt for case in study.cases)
     if (per_period := 1 / (first * longest)) < 10:
         found.append(
             f"time.dt = {longest:g} s gives {per_period:.1f} steps a period of the first mode ({first:.3g} Hz); "
-            f"take {0.1 / first:.2g} s or less"
+            f"take {_rounded_down(0.1 / first):g} s or less"
         )
-    if (bound := bending_bound(spec)) > 1.5:
+    if (bound := max(bending_bound(case) for case in study.cases)) > 1.5:
         found.append(f"the walls may be {bound:.1f} times too stiff in bending: read racking and wall stress as lower bounds")
-    uplift = _uplift_range(study, model)[1]
+    uplift = _uplift_range(study)[1]
     if uplift > 1:
         found.append(f"the net uplift of the pressure reaches {uplift:.3g} times the box's weight: it leaves its floor")
     if found_waves := _short_waves(study, model):
         found.append(found_waves)
     return found
+
+
+def _rounded_down(value: float) -> float:
+    """To two significant digits, never up."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(f"{np.floor(value / unit) * unit:.2g}")
 
 
 def _short_waves(study: Study, model: Model) -> str:

@@ -2,7 +2,7 @@
 
 import platform
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from engine import Mesh, Model, Response, Status
+from engine import Model, Response, Status
 from engine.simulate import OPENING, PENETRATION, PRESSURE, SLIP
 
 from .plan import Study
@@ -109,8 +109,7 @@ def build_dataset(study: Study, models: Sequence[Model], parts: Sequence[dict[st
         stress_component=("stress_component", ["xx", "yy", "xy"]),
         mode=("mode", np.arange(1, len(model.frequencies) + 1)),
     )
-    ds = _with_joint(ds, models)
-    ds = _with_mesh(ds, models[0], len({id(model.system) for model in models}) == 1)
+    ds = _with_mesh(ds, study, models, owner)
     ds.attrs = _provenance(study)
     return ds
 
@@ -156,11 +155,12 @@ def _on_grid(values: np.ndarray, time: np.ndarray, grid: np.ndarray) -> np.ndarr
 
 
 def _stacked(values: list[np.ndarray]) -> np.ndarray:
-    """Arrays one after the other, padded with NaN where they are shorter than the longest."""
+    """Arrays one after the other, padded (NaN, -1, empty text) where they are shorter than the longest."""
     if values[0].ndim == 0:
         return np.array(values)
+    fill = {"f": np.nan, "i": -1}.get(values[0].dtype.kind, "")
     shape = tuple(np.max([v.shape for v in values], axis=0))
-    result = np.full((len(values), *shape), np.nan)
+    result = np.full((len(values), *shape), fill, dtype=np.result_type(*values))
     for i, value in enumerate(values):
         result[i][tuple(slice(n) for n in value.shape)] = value
     return result
@@ -215,57 +215,92 @@ def joint_sides(model: Model) -> list[str]:
     return [names.get((round(x), round(y)), "side") for x, y in model.system.points.normal]
 
 
-def _with_joint(ds: xr.Dataset, models: Sequence[Model]) -> xr.Dataset:
-    """Coordinates of the joint points; of the model with the most points where the cases differ."""
-    model = max(models, key=lambda m: len(m.system.points))
-    points, probes = model.system.points, model.system.mesh.probes.values()
-    values: dict[str, Any] = {
-        "point_x": [probe.x for probe in probes],
-        "point_y": [probe.y for probe in probes],
-        "joint_x": points.place[:, 0],
-        "joint_y": points.place[:, 1],
-        "joint_arc": points.arc,
-        "joint_length": points.length,
-        "joint_side": joint_sides(model),
+def _with_mesh(ds: xr.Dataset, study: Study, models: Sequence[Model], owner: np.ndarray) -> xr.Dataset:
+    """Points, joints and the UGRID topology; what a sweep changes carries its axis and is padded to the largest."""
+
+    def varying(dims: tuple[str, ...], of: Callable[[Model], Any], attrs: dict[str, Any]) -> tuple:
+        axes, values = _varying(study, [np.asarray(of(model)) for model in models], owner)
+        return (*axes, *dims), values, attrs
+
+    described = {
+        name: varying(COORDINATES[name].dims, of, _attributes(*_facts(COORDINATES[name]))) for name, of in _PLACES.items()
     }
-    described = {n: (COORDINATES[n].dims, v, _attributes(*_facts(COORDINATES[n]))) for n, v in values.items()}
-    return ds.assign_coords(described)
+    for i, name in enumerate(("mesh_node_x", "mesh_node_y")):
+        attrs = {"units": "m", "long_name": f"{'xy'[i]} of the node"}
+        described[name] = varying(("node",), _coordinate(i), attrs)
+    ds = ds.assign_coords(described)
+    ds["mesh"] = xr.Variable((), np.int32(0), _TOPOLOGY)
+    for name, dims, of, attrs in _CONNECTIVITY:
+        ds[name] = varying(dims, of, attrs)
+    for name, location in (("mesh_layer", "face"), ("shape", "node")):
+        ds[name].attrs |= {"mesh": "mesh", "location": location}
+    return ds
+
+
+def _coordinate(i: int) -> Callable[[Model], Any]:
+    return lambda model: model.system.mesh.nodes[:, i]
+
+
+_PLACES: dict[str, Callable[[Model], Any]] = {
+    "point_x": lambda m: [probe.x for probe in m.system.mesh.probes.values()],
+    "point_y": lambda m: [probe.y for probe in m.system.mesh.probes.values()],
+    "joint_x": lambda m: m.system.points.place[:, 0],
+    "joint_y": lambda m: m.system.points.place[:, 1],
+    "joint_arc": lambda m: m.system.points.arc,
+    "joint_length": lambda m: m.system.points.length,
+    "joint_side": lambda m: joint_sides(m),
+}
+
+_TOPOLOGY = {
+    "cf_role": "mesh_topology",
+    "topology_dimension": np.int32(2),
+    "node_coordinates": "mesh_node_x mesh_node_y",
+    "face_node_connectivity": "mesh_face_nodes",
+    "face_dimension": "face",
+    "long_name": "mesh of the cases",
+}
+
+_CONNECTIVITY: tuple[tuple[str, tuple[str, ...], Callable[[Model], Any], dict[str, Any]], ...] = (
+    (
+        "mesh_face_nodes",
+        ("face", "corner"),
+        lambda m: m.system.mesh.triangles.astype(np.int32),
+        {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
+    ),
+    (
+        "mesh_layer",
+        ("face",),
+        lambda m: m.system.mesh.material.astype(np.int32),
+        {"long_name": "layer of the triangle", "comment": "0 is the layer at the surface; the largest number is the structure"},
+    ),
+    (
+        "joint_nodes",
+        ("joint", "joint_corner"),
+        lambda m: m.system.points.nodes.astype(np.int32),
+        {"long_name": "nodes of the joint element: 1-2 ground, 3-4 structure"},
+    ),
+)
+
+
+def _varying(study: Study, values: list[np.ndarray], owner: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+    """The axes along which a batch's value changes, and the values with those axes first, padded to the largest."""
+    if all(value.shape == values[0].shape and (value == values[0]).all() for value in values):
+        return (), values[0]
+    padded = _stacked(values)
+    all_cases = padded[owner[:, 0]].reshape(study.shape + padded.shape[1:])
+    names: list[str] = []
+    for axis in study.axes:
+        first = np.take(all_cases, [0], axis=len(names))
+        same = (all_cases == first) | ((all_cases != all_cases) & (first != first))
+        if same.all():
+            all_cases = np.take(all_cases, 0, axis=len(names))
+        else:
+            names.append(axis.name)
+    return tuple(names), all_cases
 
 
 def _facts(variable: Variable) -> tuple[str, str, str]:
     return variable.unit, variable.long_name, variable.meaning
-
-
-def _with_mesh(ds: xr.Dataset, model: Model, only_one: bool) -> xr.Dataset:
-    """UGRID topology of the first mesh, with the layer of every triangle and the nodes of every joint."""
-    mesh: Mesh = model.system.mesh
-    topology = {
-        "cf_role": "mesh_topology",
-        "topology_dimension": np.int32(2),
-        "node_coordinates": "mesh_node_x mesh_node_y",
-        "face_node_connectivity": "mesh_face_nodes",
-        "face_dimension": "face",
-        "long_name": "mesh of the first case" if not only_one else "mesh of all cases",
-    }
-    ds["mesh"] = xr.Variable((), np.int32(0), topology)
-    ds["mesh_face_nodes"] = xr.Variable(
-        ("face", "corner"), mesh.triangles.astype(np.int32), {"cf_role": "face_node_connectivity", "start_index": np.int32(0)}
-    )
-    n_layer = len(model.spec.layer)
-    comment = f"0 to {n_layer - 1}: layers from the top; {n_layer}: structure"
-    ds["mesh_layer"] = xr.Variable(
-        ("face",), mesh.material.astype(np.int32), {"long_name": "layer of the triangle", "comment": comment}
-    )
-    ds["joint_nodes"] = xr.Variable(
-        ("joint", "joint_corner"), _joint_nodes(model), {"long_name": "nodes of the joint element: 1-2 ground, 3-4 structure"}
-    )
-    for i, name in enumerate(("mesh_node_x", "mesh_node_y")):
-        ds = ds.assign_coords({name: ("node", mesh.nodes[:, i], {"units": "m", "long_name": f"{'xy'[i]} of the node"})})
-    return ds
-
-
-def _joint_nodes(model: Model) -> np.ndarray:
-    return model.system.points.nodes.astype(np.int32)
 
 
 def _provenance(study: Study) -> dict[str, str]:

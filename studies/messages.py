@@ -55,7 +55,7 @@ def _lines(e: Any) -> list[str]:
 
 
 def _given(value: Any) -> str:
-    return "" if isinstance(value, dict) and len(str(value)) > 40 else f" = {shown(value)}"
+    return "" if isinstance(value, dict) else f" = {shown(value)}"
 
 
 def _rule(e: Any) -> str:

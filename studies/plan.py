@@ -2,7 +2,7 @@
 
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -23,6 +23,7 @@ SHIPPED = Path(__file__).parent
 MOTIONS = SHIPPED / "motions"
 MOST_CASES = 1_000_000
 MOST_BYTES = 1_000_000
+MOST_NESTED = 20
 
 
 @dataclass(frozen=True)
@@ -99,15 +100,28 @@ def load_study(source: str | Path) -> Study:
     text = _read(path)
     try:
         table = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        reason = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "is nested too deeply"
-        raise StudyError([f"{path.name}: is not valid TOML: {reason}"]) from None
+        if _depth(table) > MOST_NESTED:
+            raise RecursionError
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError([f"{path.name}: is not valid TOML: {error}"]) from None
+    except RecursionError:
+        raise StudyError([f"{path.name}: is nested too deeply for a study"]) from None
     return make_study(table, path.stem, text, path.parent, path.name)
+
+
+def _depth(table: Any) -> int:
+    """How deeply tables and lists are nested, found without recursion."""
+    deepest, level = 0, [table]
+    while level:
+        deepest += 1
+        level = [inner for outer in level for inner in (outer.values() if isinstance(outer, dict) else outer)]
+        level = [entry for entry in level if isinstance(entry, (dict, list))]
+    return deepest
 
 
 def _find(source: str | Path) -> Path:
     path = Path(source)
-    if path.exists():
+    if _safely(path.exists):
         return path
     shipped = shipped_studies()
     if str(source) in shipped:
@@ -137,7 +151,7 @@ def make_study(table: dict[str, Any], name: str = "study", text: str = "", folde
         mistakes.append(f"title = {shown(title)}: must be text in quotes")
     base = _base(table, mistakes)
     axes = _axes(table.get("sweep", {}), mistakes)
-    cases = _cases(base, axes, mistakes) if base is not None else []
+    cases = _cases(base or Spec(), axes, mistakes, only_values=base is None)
     motions = _motions(_records(table, base, cases), folder or Path(), mistakes)
     if mistakes:
         lead = f"{file or name}: "
@@ -253,7 +267,9 @@ def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) 
             mistakes.append(f"{name}.{key} = {shown(entry[key])}: {error}")
     num: Any = entry.get("num")
     spacing = entry.get("spacing", "linear")
-    if isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_CASES:
+    if "num" not in entry:
+        mistakes.append(f"{name}.num: is missing")
+    elif isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_CASES:
         mistakes.append(f"{name}.num = {shown(num)}: must be a whole number from 2 to {MOST_CASES:,}")
     if spacing not in ("linear", "log"):
         mistakes.append(f'{name}.spacing = {shown(spacing)}: must be "linear" or "log"')
@@ -265,21 +281,24 @@ def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) 
     return [float(value) for value in make(ends[0], ends[1], num)]
 
 
-def _cases(base: Spec, axes: list[Axis], mistakes: list[str]) -> list[Spec]:
-    """All combinations of the axes' values; mistakes of single values are found on each axis alone first."""
+def _cases(base: Spec, axes: list[Axis], mistakes: list[str], only_values: bool) -> list[Spec]:
+    """All combinations of the axes' values; mistakes of single values are found on each axis alone first.
+
+    Where the model itself is wrong (`only_values`) the values are checked by themselves, on the preset.
+    """
     before = len(mistakes)
     if not axes:
-        return [base]
+        return [] if only_values else [base]
     for axis in axes:
         for value in axis.values:
-            _case(base, [(axis, value)], mistakes)
-    if len(mistakes) > before or not all(axis.values for axis in axes):
+            _case(base, [(axis, value)], mistakes, only_values)
+    if only_values or len(mistakes) > before or not all(axis.values for axis in axes):
         return []
-    found = [_case(base, list(zip(axes, values, strict=True)), mistakes) for values in product(*(a.values for a in axes))]
+    found = [_case(base, list(zip(axes, values, strict=True)), mistakes, False) for values in product(*(a.values for a in axes))]
     return [case for case in found if case is not None]
 
 
-def _case(base: Spec, settings: list[tuple[Axis, Any]], mistakes: list[str]) -> Spec | None:
+def _case(base: Spec, settings: list[tuple[Axis, Any]], mistakes: list[str], only_values: bool) -> Spec | None:
     table = base.model_dump()
     for axis, value in settings:
         *path, last = axis.field.path
@@ -290,10 +309,13 @@ def _case(base: Spec, settings: list[tuple[Axis, Any]], mistakes: list[str]) -> 
                 mistakes.append(f"sweep.{axis.field.name}: there are {len(part)} layers")
                 return None
             part = part[index]
-        part[last] = value
+        whole = isinstance(part[last], int) and isinstance(value, float) and value.is_integer()
+        part[last] = int(value) if whole else value
     try:
         return Spec.model_validate(table)
     except ValidationError as error:
+        if only_values and not any(e["loc"] for e in error.errors()):
+            return None
         mistakes.extend(
             f"sweep.{settings[0][0].name}: {line}" if len(settings) == 1 else f"sweep: {line}" for line in explain(error)
         )
@@ -313,7 +335,7 @@ def _motions(records: dict[str, str], folder: Path, mistakes: list[str]) -> dict
     """The records by name, each read once: sought beside the study, then among those shipped."""
     motions: dict[str, GroundMotion] = {}
     for name, field in records.items():
-        path = next((root / name for root in (folder, MOTIONS, SHIPPED) if _is_file(root / name)), None)
+        path = next((root / name for root in (folder, MOTIONS, SHIPPED) if _safely((root / name).is_file)), None)
         try:
             if path is None:
                 shipped = ", ".join(sorted(p.name for p in MOTIONS.glob("*.AT2")))
@@ -324,18 +346,21 @@ def _motions(records: dict[str, str], folder: Path, mistakes: list[str]) -> dict
     return motions
 
 
-def _is_file(path: Path) -> bool:
+def _safely(question: Callable[[], bool]) -> bool:
     try:
-        return path.is_file()
-    except (OSError, ValueError):
+        return question()
+    except (OSError, ValueError):  # a name too long, or with a zero byte
         return False
 
 
 def _check_motions(study: Study, file: str) -> None:
     """Prepare the motion of each kind of case once, so that a record that cannot be scaled is found before anything runs."""
     seen = {(spec.motion, spec.time): i for i, spec in enumerate(study.cases)}
-    try:
-        for case in seen.values():
+    mistakes = []
+    for case in seen.values():
+        try:
             study.ground(case)
-    except MotionError as error:
-        raise StudyError([f"{file}: motion: {error}"]) from None
+        except MotionError as error:
+            mistakes.append(f"{file}: motion.record = {shown(study.cases[case].motion.record)}: {error}")
+    if mistakes:
+        raise StudyError(list(dict.fromkeys(mistakes)))

@@ -46,7 +46,7 @@ def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
     """Draw every figure that the dataset allows beside `path`; the files drawn are returned."""
     done = cases_of(ds)
     done = done.isel(case=np.flatnonzero(done["status"].values <= Status.SUBSTEPS))
-    drawings: dict[str, Callable[[], Figure]] = {"mesh": lambda: mesh_figure(ds)}
+    drawings: dict[str, Callable[[], Figure]] = {"mesh": lambda: mesh_figure(cases_of(ds).isel(case=0))}
     if done.sizes["case"]:
         axes = axes_of(ds)
         shown = _shown(done, axes)
@@ -70,7 +70,8 @@ def _shown(cases: xr.Dataset, axes: list[str]) -> dict[int, str]:
     """Up to three cases to show side by side (first, middle, last), with their labels."""
     n = cases.sizes["case"]
     chosen = sorted({0, n // 2, n - 1})
-    return {i: ", ".join(f"{_symbol(a)} = {in_words(cases[a].values[i], cases[a].attrs['units'])}" for a in axes) for i in chosen}
+    labels = {i: [f"{_symbol(a)} = {in_words(cases[a].values[i], cases[a].attrs['units'])}" for a in axes] for i in chosen}
+    return {i: ",\n".join(", ".join(parts[k : k + 2]) for k in range(0, len(parts), 2)) for i, parts in labels.items()}
 
 
 def _symbol(axis: str) -> str:
@@ -80,7 +81,15 @@ def _symbol(axis: str) -> str:
 def _triangles(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Corner coordinates (n, 3, 2) and layer of all triangles."""
     nodes = np.column_stack([ds["mesh_node_x"], ds["mesh_node_y"]])
-    return nodes[ds["mesh_face_nodes"].values.astype(int)], ds["mesh_layer"].values.astype(int)
+    faces, layer = _faces(ds)
+    return nodes[faces], layer
+
+
+def _faces(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Corners and layer of the triangles of one case, without the padding that a sweep of meshes brings."""
+    faces = ds["mesh_face_nodes"].values.astype(int)
+    there = faces[:, 0] >= 0
+    return faces[there], ds["mesh_layer"].values.astype(int)[there]
 
 
 def mesh_figure(ds: xr.Dataset) -> Figure:
@@ -116,7 +125,8 @@ def _layer_names(ax: Axes, corners: np.ndarray, layer: np.ndarray, structure: in
 
 def _joint_line(ax: Axes, ds: xr.Dataset, width: float, colour: str) -> None:
     nodes = np.column_stack([ds["mesh_node_x"], ds["mesh_node_y"]])
-    pairs = nodes[ds["joint_nodes"].values[:, :2].astype(int)]
+    joints = ds["joint_nodes"].values.astype(int)
+    pairs = nodes[joints[joints[:, 0] >= 0, :2]]
     ax.add_collection(LineCollection(list(pairs), colors=colour, linewidths=width, zorder=3))
 
 
@@ -151,7 +161,8 @@ def history_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     )
     time = cases["time"].values
     moment = time[int(np.nanargmax(np.abs(rows[0][1].isel(case=max(shown)).values)))]
-    start = float(np.clip(moment - ZOOM / 2, 0, max(time[-1] - ZOOM, 0)))
+    shown_part = min(ZOOM, time[-1])
+    start = float(np.clip(moment - shown_part / 2, 0, time[-1] - shown_part))
     fig = Figure(figsize=(WIDTH, 5.4))
     panels = fig.subplots(len(rows), 2, sharex="col", sharey="row", width_ratios=(1.6, 1))
     for (label, values, factor), (whole, part) in zip(rows, panels, strict=True):
@@ -160,9 +171,9 @@ def history_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
             whole.plot(time, history, color=colour, ls="-", lw=0.5, alpha=0.8)
             part.plot(time, history, color=colour, ls=dash, label=name)
         whole.set_ylabel(label)
-        whole.axvspan(start, start + ZOOM, color="0.88", zorder=0)
+        whole.axvspan(start, start + shown_part, color="0.88", zorder=0)
     panels[0, 0].set_xlim(0, time[-1])
-    panels[0, 1].set_xlim(start, start + ZOOM)
+    panels[0, 1].set_xlim(start, start + shown_part)
     for ax in panels[-1]:
         ax.set_xlabel("time [s]")
     if any(shown.values()):
@@ -226,8 +237,8 @@ def deformed_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     for i, (case, name) in enumerate(shown.items()):
         ax = fig.add_subplot(1, len(shown), i + 1)
         factor = _deformed(ax, cases.isel(case=case))
-        moment = f"t = {float(cases['shape_time'][case]):.2f} s, displacements × {factor:,.0f}"
-        ax.set_title(f"{name}\n{moment}" if name else moment, loc="left")
+        moment = f"t = {float(cases['shape_time'][case]):.2f} s, {'displacements' if len(shown) < 3 else 'u'} × {factor:,.0f}"
+        ax.set_title(f"{name}\n{moment}" if name else moment, loc="left", fontsize=7.5)
         ax.set(aspect="equal", xlabel="x [m]")
         if i == 0:
             ax.set_ylabel("y [m]")
@@ -239,7 +250,7 @@ def deformed_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
 def _deformed(ax: Axes, case: xr.Dataset) -> float:
     """Draw one deformed box; the factor on its displacements is returned."""
     nodes = np.column_stack([case["mesh_node_x"], case["mesh_node_y"]])
-    faces, layer = case["mesh_face_nodes"].values.astype(int), case["mesh_layer"].values.astype(int)
+    faces, layer = _faces(case)
     structure = layer == layer.max()
     box = nodes[np.unique(faces[structure])]
     low, high = box.min(axis=0), box.max(axis=0)
@@ -259,22 +270,26 @@ def _deformed(ax: Axes, case: xr.Dataset) -> float:
 
 def _joint_states(ax: Axes, case: xr.Dataset, moved: np.ndarray) -> None:
     """The structure's moved outline, the tributary length of every joint point in the colour of its state."""
+    case = case.isel(joint=np.flatnonzero(np.isfinite(case["joint_arc"].values)))
     corners = case["joint_nodes"].values.astype(int)
     original = np.column_stack([case["mesh_node_x"], case["mesh_node_y"]])
     first, last = corners[:, 3], corners[:, 2]
     before = np.linalg.norm(np.column_stack([case["joint_x"], case["joint_y"]]) - original[first], axis=1)
     element = np.linalg.norm(original[last] - original[first], axis=1)
-    arc, length = case["joint_arc"].values, case["joint_length"].values
+    arc = case["joint_arc"].values
     for side in np.unique(case["joint_side"].values):
         on = np.flatnonzero(case["joint_side"].values == side)
         node_arc = np.concatenate([(arc - before)[on], (arc - before + element)[on]])
         order = np.argsort(node_arc)
         line = moved[np.concatenate([first[on], last[on]])][order]
-        begin, end = node_arc.min(), node_arc.max()
-        for p in on[~np.isnan(case["shape_state"].values[on])]:
-            low = arc[p] - (length[p] if np.isclose(arc[p], end) else length[p] / 2)
-            high = arc[p] + (length[p] if np.isclose(arc[p], begin) else length[p] / 2)
-            span = np.clip([low, min(max(arc[p], low), high), high], begin, end)
+        on = on[np.argsort(arc[on])]
+        at_nodes = np.isclose(before[on[0]], 0.0) or np.isclose(before[on[0]], element[on[0]])
+        inner = (arc[on[:-1]] + arc[on[1:]]) / 2 if at_nodes else (arc - before + element)[on[:-1]]
+        ends = [node_arc.min(), *inner, node_arc.max()]
+        for p, low, high in zip(on, ends[:-1], ends[1:], strict=True):
+            if np.isnan(case["shape_state"].values[p]):
+                continue
+            span = [low, np.clip(arc[p], low, high), high]
             xy = [np.interp(span, node_arc[order], line[:, i]) for i in range(2)]
             colour = JOINT_COLOURS[JOINT_STATES[int(case["shape_state"].values[p])]]
             ax.plot(*xy, color=colour, lw=2.5, solid_capstyle="butt", zorder=4)

@@ -1,22 +1,28 @@
 """Executes the batches of a study, one process a core, and writes the dataset."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from engine import Model, Spec, build_model, free_field, simulate_cases
+from engine import MeshError, Model, Spec, Status, build_model, free_field, simulate_cases
 
 from .dataset import build_dataset, case_arrays
+from .messages import StudyError
 from .plan import Study, load_study
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+TRIES_ALONE = 2
+"""How often a batch is tried by itself after the pool it ran in has broken."""
 
 Progress = Callable[[int], None]
 """Told how many case-steps have been done since it was last called."""
@@ -30,6 +36,14 @@ class Outcome:
     arrays: dict[str, np.ndarray]
 
 
+@dataclass(frozen=True)
+class Lost:
+    """A batch that gave nothing, and why; its cases become NaN with this status."""
+
+    status: Status
+    reason: str
+
+
 def run(source: str | Path, workers: int | None = None) -> xr.Dataset:
     """Run a study file or a shipped study and return its dataset; nothing is written. StudyError where the file is wrong."""
     return run_study(load_study(source), workers)
@@ -37,29 +51,90 @@ def run(source: str | Path, workers: int | None = None) -> xr.Dataset:
 
 def run_study(study: Study, workers: int | None = None, progress: Progress | None = None) -> xr.Dataset:
     """Run all batches of a study; `workers` processes, as many as cores by default."""
-    outcomes: list[Outcome | None] = [None] * len(study.batches)
+    outcomes: dict[int, Outcome | Lost] = {}
     for i, outcome in _outcomes(study, workers or os.cpu_count() or 1, progress or (lambda steps: None)):
         outcomes[i] = outcome
+    whole = next((outcome for outcome in outcomes.values() if isinstance(outcome, Outcome)), None)
+    if whole is None:
+        raise StudyError(
+            sorted({f"{study.name}: {outcome.reason}" for outcome in outcomes.values() if isinstance(outcome, Lost)})
+        )
     owner = np.zeros((len(study.cases), 2), dtype=int)
+    found = []
     for b, batch in enumerate(study.batches):
+        outcome = outcomes[b]
+        found.append(_emptied(whole, len(batch.cases), outcome) if isinstance(outcome, Lost) else outcome)
         for lane, case in enumerate(batch.cases):
             owner[case] = b, lane
-    done = [outcome for outcome in outcomes if outcome is not None]
-    return build_dataset(study, [outcome.model for outcome in done], [outcome.arrays for outcome in done], owner)
+    return build_dataset(study, [outcome.model for outcome in found], [outcome.arrays for outcome in found], owner)
 
 
-def _outcomes(study: Study, workers: int, progress: Progress) -> Iterator[tuple[int, Outcome]]:
-    jobs = [([study.cases[i] for i in batch.cases], [study.ground(i) for i in batch.cases]) for batch in study.batches]
+def _emptied(whole: Outcome, n_case: int, lost: Lost) -> Outcome:
+    """An outcome of the form of `whole` with NaN for all that a lost batch did not give."""
+    arrays = {name: np.full((n_case, *array.shape[1:]), np.nan) for name, array in whole.arrays.items() if name != "time"}
+    arrays |= {"time": whole.arrays["time"], "status": np.full(n_case, lost.status)}
+    arrays["reason"] = np.array([lost.reason] * n_case, dtype=object)
+    return Outcome(whole.model, arrays)
+
+
+def _outcomes(study: Study, workers: int, progress: Progress) -> Iterator[tuple[int, Outcome | Lost]]:
+    jobs = {
+        i: ([study.cases[k] for k in batch.cases], [study.ground(k) for k in batch.cases])
+        for i, batch in enumerate(study.batches)
+    }
     if min(workers, len(jobs)) == 1:
-        for i, (specs, motions) in enumerate(jobs):
-            yield i, run_batch(specs, motions, progress)
+        for i, job in jobs.items():
+            yield i, _guarded(*job, progress)
         return
-    with _one_thread(), ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(run_batch, *job): i for i, job in enumerate(jobs)}
-        for future in as_completed(futures):
-            specs, motions = jobs[futures[future]]
-            progress(sum(len(motion) - 1 for motion in motions))
-            yield futures[future], future.result()
+    with _one_thread():
+        left = dict(jobs)
+        for i, outcome in _in_pool(jobs, min(workers, len(jobs))):
+            progress(sum(len(motion) - 1 for motion in jobs[i][1]))
+            del left[i]
+            yield i, outcome
+        for i, job in left.items():  # a worker was lost and took the pool with it: each batch left gets a pool of its own
+            yield i, _alone(job)
+            progress(sum(len(motion) - 1 for motion in job[1]))
+
+
+Job = tuple[list[Spec], list[np.ndarray]]
+
+
+def _in_pool(jobs: dict[int, Job], workers: int) -> Iterator[tuple[int, Outcome | Lost]]:
+    """Outcomes as they come; ends early where a worker is lost, which breaks the whole pool."""
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent) as pool:
+        futures = {pool.submit(_guarded, *job): i for i, job in jobs.items()}
+        try:
+            for future in as_completed(futures):
+                try:
+                    outcome = future.result()
+                except BrokenProcessPool:
+                    continue
+                yield futures[future], outcome
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in active_children():
+                child.terminate()
+            raise
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _alone(job: Job) -> Outcome | Lost:
+    for _ in range(TRIES_ALONE):
+        for _, outcome in _in_pool({0: job}, 1):
+            return outcome
+    return Lost(Status.WORKER_LOST, f"the process that computed it was lost {1 + TRIES_ALONE} times")
+
+
+def _guarded(specs: list[Spec], motions: list[np.ndarray], progress: Progress | None = None) -> Outcome | Lost:
+    """`run_batch`, with what stops it told as a reason instead of stopping the other batches."""
+    try:
+        return run_batch(specs, motions, progress)
+    except (MeshError, MemoryError, ArithmeticError, np.linalg.LinAlgError, RuntimeError) as error:
+        return Lost(Status.NOT_RUN, f"could not be computed: {error or type(error).__name__}")
 
 
 @contextmanager
@@ -101,17 +176,17 @@ def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress |
         "peak_racking_free_field": field.peak,
         "base_acceleration": base,
         "peak_base_acceleration": np.array([np.abs(motion).max(axis=0) for motion in motions]),
-        "uplift_over_weight": np.array([uplift_over_weight(model, spec) for spec in specs]),
+        "uplift_over_weight": np.array([uplift_over_weight(spec) for spec in specs]),
     }
     return Outcome(model, case_arrays(model, response, extra))
 
 
-def uplift_over_weight(model: Model, spec: Spec) -> float:
-    """Net upward resultant of the water pressure on the box over the box's weight under gravity."""
-    vertical = np.tile([0.0, 1.0], len(model.system.mesh.nodes))
+def uplift_over_weight(spec: Spec) -> float:
+    """Net upward resultant of the water pressure on the box, p0 width height / H_ref, over the box's weight under gravity."""
     box = spec.box
+    uplift = spec.pressure.p0 / spec.pressure.reference_height * box.width * box.height
     solid = box.width * box.height - (box.width - 2 * box.wall) * (box.height - 2 * box.wall)
-    return float(vertical @ model.system.expand @ model.pressure(spec)) / (solid * box.density * spec.gravity.acceleration)
+    return uplift / (solid * box.density * spec.gravity.acceleration)
 
 
 def write_dataset(ds: xr.Dataset, path: Path) -> None:
@@ -119,7 +194,10 @@ def write_dataset(ds: xr.Dataset, path: Path) -> None:
     part = path.with_name(path.name + ".part")
     path.parent.mkdir(parents=True, exist_ok=True)
     numeric = [name for name in ds.data_vars if ds[name].dtype.kind == "f" and ds[name].ndim]
-    ds.to_netcdf(part, engine="netcdf4", encoding={name: {"zlib": True, "complevel": 1} for name in numeric})
-    with part.open("rb+") as file:
-        os.fsync(file.fileno())
-    part.replace(path)
+    try:
+        ds.to_netcdf(part, engine="netcdf4", encoding={name: {"zlib": True, "complevel": 1} for name in numeric})
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -66,7 +66,9 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 
 def in_words(value: object, unit: str) -> str:
     """A value with its unit, as a reader would write it: 2 MPa, 0.05."""
-    if isinstance(value, (str, bool, np.str_, np.bool_)):
+    if isinstance(value, (bool, np.bool_)):
+        return str(bool(value)).lower()
+    if isinstance(value, str):
         return str(value)
     number = float(value)  # type: ignore[arg-type]
     if number == 0.0:
@@ -76,35 +78,37 @@ def in_words(value: object, unit: str) -> str:
         for factor, prefix in _PREFIXES:
             if abs(number) >= 0.01 * factor and abs(number) >= 1e3:
                 return f"{number / factor:.3g} {prefix}{unit}"
-    return f"{number:.3g}" if unit in ("", "1") else f"{number:.3g} {unit}"
+    text = f"{number:.0f}" if 1e3 <= abs(number) < 1e5 and number == round(number) else f"{number:.3g}"
+    return text if unit in ("", "1") else f"{text} {unit}"
 
 
 def sentences(ds: xr.Dataset) -> list[str]:
     """Three sentences from the data: the state before the shaking, the first slip, the racking."""
     done = cases_of(ds)
+    axes = axes_of(ds) if done.sizes["case"] > 1 else []
     done = done.isel(case=np.flatnonzero(done["status"].values <= Status.SUBSTEPS))
     if done.sizes["case"] == 0:
         return ["No case of this study has come to its end."]
-    return [_before_shaking(done, axes_of(ds)), _first_slip(done, axes_of(ds)), _racking(done, axes_of(ds))]
+    return [_before_shaking(done, axes), _first_slip(done, axes), _racking(done, axes)]
 
 
 def _at(cases: xr.Dataset, axes: list[str], i: int) -> str:
-    """' at p0 = 2 MPa', or nothing where there is but one case."""
-    if not axes or cases.sizes["case"] == 1:
+    """' at p0 = 2 MPa', or nothing where the study is a single case."""
+    if not axes:
         return ""
     return " at " + ", ".join(f"{axis} = {in_words(cases[axis].values[i], cases[axis].attrs['units'])}" for axis in axes)
 
 
 def _before_shaking(cases: xr.Dataset, axes: list[str]) -> str:
     closed = 100 * cases["closed_before_shaking"].values
-    floor = cases["gap_before_shaking"].values[:, cases["joint_side"].values == "floor"]
-    lifted = np.asarray((floor > 0).all(axis=1))
+    lifted: np.ndarray = np.where(_sides(cases) == "floor", cases["gap_before_shaking"].values > 0, True).all(axis=1)  # type: ignore[assignment]
     if len(closed) == 1:
-        return f"Before shaking {closed[0]:.0f} % of the joint is closed and the floor {'has lifted' if lifted[0] else 'bears'}."
+        floor_does = "has lifted" if lifted[0] else "bears"
+        return f"Before shaking {closed[0]:.0f} % of the joint is closed{_at(cases, axes, 0)} and the floor {floor_does}."
     least, most = int(np.argmin(closed)), int(np.argmax(closed))
-    spread = f"{closed[most]:.0f} % of the joint is closed{_at(cases, axes, most)}"
+    spread = f"{closed[most]:.0f} % of the joint is closed"
     if closed[least] < closed[most]:
-        spread += f" and {closed[least]:.0f} %{_at(cases, axes, least)}"
+        spread += f"{_at(cases, axes, most)} and {closed[least]:.0f} %{_at(cases, axes, least)}"
     if not lifted.any():
         return f"Before shaking {spread}; the floor bears in every case."
     if lifted.all():
@@ -114,17 +118,22 @@ def _before_shaking(cases: xr.Dataset, axes: list[str]) -> str:
     return f"Before shaking {spread}; the floor has lifted in {lifted.sum()} of {len(lifted)} cases."
 
 
+def _sides(cases: xr.Dataset) -> np.ndarray:
+    """Side of the box of every joint point, (case, joint), also where one list serves all cases."""
+    return np.broadcast_to(cases["joint_side"].values, cases["gap_before_shaking"].shape)
+
+
 def _first_slip(cases: xr.Dataset, axes: list[str]) -> str:
     times = cases["first_slip"].values
     if np.isnan(times).all():
         return "The joint never slips while it shakes."
     first = np.where(np.isnan(times), np.inf, times)
     case, joint = np.unravel_index(int(np.argmin(first)), first.shape)
-    side = cases["joint_side"].values[joint]
+    side = _sides(cases)[case, joint]
     where = _at(cases, axes, int(case))
     slipping = int(np.isfinite(first).any(axis=1).sum())
     if len(first) == 1:
-        return f"It first slips at {first[case, joint]:.2f} s on the {side}."
+        return f"It first slips at {first[case, joint]:.2f} s on the {side}{where}."
     return f"The first slip comes at {first[case, joint]:.2f} s on the {side}{where}; {slipping} of {len(first)} cases slip."
 
 
@@ -133,7 +142,7 @@ def _racking(cases: xr.Dataset, axes: list[str]) -> str:
     if np.isnan(ratio).all():
         return "There is no horizontal motion that would rack the free field."
     low, high = int(np.nanargmin(ratio)), int(np.nanargmax(ratio))
-    if len(ratio) == 1:
-        return f"Peak racking is {ratio[0]:.2g} × the free field's."
+    if ratio[low] == ratio[high]:
+        return f"Peak racking is {ratio[low]:.2g} × the free field's{_at(cases, axes, low)}."
     most = f"{ratio[high]:.2g} ×{_at(cases, axes, high)}"
     return f"Peak racking is {ratio[low]:.2g} × the free field's{_at(cases, axes, low)} and {most}."

@@ -1,183 +1,24 @@
 """The condensed joint solve of one lane (D9): g + G lambda(g) = g_free with the law of `joint` at every point.
 
-Unknowns are the forces of closed points, which keeps the system well conditioned however stiff the joint: a closed point adds
-1/k to the diagonal. The states of the last step are tried first, with the factor kept from then. Where a state does not hold,
+The states of the last step are tried first, with the factor kept from then. Where a state does not hold,
 the solution itself says what comes next (a Newton step on the states); Newton can cycle, so every second time block Gauss-Seidel
 sweeps propose states instead: by turns from the direct solution brought back onto the law, which has the rigid motions right,
-and on from the last sweep, which cannot cycle; twice as many sweeps each time.
+and on from the last sweep, which cannot cycle; twice as many sweeps each time. What is not found in ten rounds is followed
+along a path (`follow`).
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
-from .dense import factorise, solve
+from .follow import MAX_PIECES, follow
 from .jit import kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
+from .states import EQUATION_TOLERANCE, direct
 
-EQUATION_TOLERANCE = 1e-12  # of D9
 UNIT_ROUNDOFF = 2.0**-53
 STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep the state they have
 NEWTON_ROUNDS = 2  # direct solves between sweeps
+FOLLOW_AFTER = 10  # direct solves before the path is followed
 FIRST_SWEEPS = 8  # sweeps of the first time, doubled every time
-
-
-class Law(NamedTuple):
-    """Joint parameters of every lane, (LANES, n_point): stiffness times tributary area [N/m] and friction [1]."""
-
-    k_n: np.ndarray
-    k_s: np.ndarray
-    mu: np.ndarray
-
-
-class Workspace(NamedTuple):
-    """Scratch of the solve, and the factor kept for each lane with the states it belongs to."""
-
-    lu: np.ndarray  # (LANES, m, m)
-    pivot: np.ndarray  # (LANES, m)
-    factored: np.ndarray  # (LANES, n_point), -1 where there is none
-    unknown: np.ndarray  # (m,)
-    product: np.ndarray  # (m,) G lambda
-    swept: np.ndarray  # (m,) forces of the sweeps
-    free: np.ndarray  # (m,) g_free of the lane at work
-    start: np.ndarray  # (m,) gaps of the last step
-    proposal: np.ndarray  # (n_point,)
-    tried: np.ndarray  # (n_point,)
-
-
-def workspace(n_point: int, lanes: int) -> Workspace:
-    """An empty workspace for `n_point` joint points."""
-    m = 2 * n_point
-    return Workspace(
-        np.zeros((lanes, m, m)),
-        np.zeros((lanes, m), dtype=np.int64),
-        np.full((lanes, n_point), -1, dtype=np.int8),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(n_point, dtype=np.int8),
-        np.zeros(n_point, dtype=np.int8),
-    )
-
-
-@kernel
-def _assemble(G, k_n, k_s, mu, state, A):
-    """Fill A with the equations of the closed points in these states; the number of unknowns is returned."""
-    row = 0
-    for p in range(state.shape[0]):
-        for direction in range(1 if state[p] != STICK else 2):
-            if state[p] == OPEN:
-                continue
-            i, column = 2 * p + direction, 0
-            for q in range(state.shape[0]):
-                if state[q] == OPEN:
-                    continue
-                if state[q] == STICK:
-                    A[row, column] = G[i, 2 * q]
-                    A[row, column + 1] = G[i, 2 * q + 1]
-                    column += 2
-                else:
-                    A[row, column] = G[i, 2 * q] - slip_sign(state[q]) * mu[q] * G[i, 2 * q + 1]
-                    column += 1
-            A[row, row] += 1.0 / (k_n[p] if direction == 0 else k_s[p])
-            row += 1
-    return row
-
-
-@kernel
-def _residual(G, g_free, g, lam, product):
-    """Relative residual of g + G lambda = g_free; `product` receives G lambda. 0/0 at rest counts as solved."""
-    worst = free = scale = 0.0
-    for i in range(g.shape[0]):
-        total = 0.0
-        for j in range(g.shape[0]):
-            total += G[i, j] * lam[j]
-        product[i] = total
-        worst += (g[i] - g_free[i] + total) ** 2
-        free += g_free[i] ** 2
-        scale += total**2
-    scale = max(free, scale)
-    return 0.0 if scale == 0.0 else np.sqrt(worst / scale)
-
-
-@kernel
-def _scatter(x, k_n, k_s, mu, slip, state, g, lam, add):
-    """Forces of the unknowns x into lam, and the gaps they imply into g; `add` corrects instead of setting them."""
-    k = 0
-    for p in range(state.shape[0]):
-        n, s = 2 * p, 2 * p + 1
-        old_n = lam[n] if add else 0.0
-        old_s = lam[s] if add else 0.0
-        if state[p] == OPEN:
-            lam[n] = lam[s] = 0.0
-            continue
-        lam[n] = old_n + x[k]
-        g[n] = lam[n] / k_n[p]
-        if state[p] == STICK:
-            lam[s] = old_s + x[k + 1]
-            g[s] = slip[p] + lam[s] / k_s[p]
-            k += 2
-        else:
-            lam[s] = -slip_sign(state[p]) * mu[p] * lam[n]
-            k += 1
-
-
-@kernel
-def _free_gaps(g_free, product, state, g):
-    """Gaps that follow from the forces: both of open points, the tangential one of sliding points."""
-    for p in range(state.shape[0]):
-        if state[p] == OPEN:
-            g[2 * p] = g_free[2 * p] - product[2 * p]
-        if state[p] != STICK:
-            g[2 * p + 1] = g_free[2 * p + 1] - product[2 * p + 1]
-
-
-@kernel
-def _rows(state, source, slip, x):
-    """Entries of `source` that belong to the unknowns, less the slip of sticking points."""
-    k = 0
-    for p in range(state.shape[0]):
-        if state[p] == OPEN:
-            continue
-        x[k] = source[2 * p]
-        k += 1
-        if state[p] == STICK:
-            x[k] = source[2 * p + 1] - slip[p]
-            k += 1
-
-
-@kernel
-def _direct(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, unknown, product):
-    """Solve for given states. The factor is reused while they last. Returns the relative residual, infinity where singular."""
-    n_point = state.shape[0]
-    same, size = True, 0
-    for p in range(n_point):
-        same = same and factored[p] == state[p]
-        size += 0 if state[p] == OPEN else (2 if state[p] == STICK else 1)
-    if not same:
-        _assemble(G, k_n, k_s, mu, state, lu)
-        factored[:] = state
-        if not factorise(lu, size, pivot):
-            factored[:] = -1
-            return np.inf
-    _rows(state, g_free, slip, unknown)
-    solve(lu, size, pivot, unknown)
-    _scatter(unknown, k_n, k_s, mu, slip, state, g, lam, False)
-    _residual(G, g_free, g, lam, product)
-    _free_gaps(g_free, product, state, g)
-    residual = _residual(G, g_free, g, lam, product)
-    if residual > 0.1 * EQUATION_TOLERANCE:  # one step of iterative refinement
-        for i in range(g.shape[0]):
-            product[i] = g_free[i] - product[i] - g[i]
-        _rows(state, product, np.zeros(n_point), unknown)
-        solve(lu, size, pivot, unknown)
-        _scatter(unknown, k_n, k_s, mu, slip, state, g, lam, True)
-        _residual(G, g_free, g, lam, product)
-        _free_gaps(g_free, product, state, g)
-        residual = _residual(G, g_free, g, lam, product)
-    return residual
 
 
 @kernel
@@ -273,7 +114,7 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     if not np.isfinite(np.sum(g_free)):
         return -1, np.nan
     for attempt in range(1, max_rounds + 1):
-        residual = _direct(G, g_free, k_n, k_s, mu, slip, proposal, g, lam, lu, pivot, factored, work.unknown, work.product)
+        residual = direct(G, g_free, k_n, k_s, mu, slip, proposal, g, lam, lu, pivot, factored, work.unknown, work.product)
         if not np.isfinite(residual):
             break
         work.tried[:] = proposal
@@ -281,7 +122,10 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
         if held and residual <= max(EQUATION_TOLERANCE, _rounding(G, g_free, lam, work.product)):
             state[:] = work.tried
             return attempt, residual
-        if attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
+        if attempt == FOLLOW_AFTER:
+            pieces = MAX_PIECES * state.shape[0]
+            follow(G, g_free, k_n, k_s, mu, slip, proposal, g, lam, lu, pivot, factored, work, pieces)
+        elif attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
             if attempt % (2 * NEWTON_ROUNDS) != 0:
                 _project(lam, mu, work.swept)
             for _ in range(sweeps):

@@ -22,7 +22,7 @@ def _key() -> str:
     """Digest of all that decides the machine code, which numba's own stamp (the file's time) does not see."""
     digest = hashlib.sha256(f"{numba.__version__} {sorted(FLAGS.items())!r} {LANES}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -1,0 +1,89 @@
+"""The last resort of the joint solve: follow the solution along a path on which it cannot be missed (D9).
+
+The law is piecewise linear in g, so the solution for g_free moving on a straight line is a chain of straight pieces, each known
+from a direct solve at both ends (Katzenelson 1965, for resistive networks). From all points open and pushed apart the chain
+leads to g_free; where the solution is unique it can neither return to its start nor run away. Exact ties are not treated.
+"""
+
+import numpy as np
+
+from .jit import kernel
+from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, slip_sign
+from .states import direct
+
+MAX_PIECES = 40
+"""Pieces of the path a joint point."""
+
+
+@kernel
+def _margin(p, to, state, g, lam, slip, k_s, mu):
+    """How far point p is from the border between its state and the state `to`: linear within a piece, negative beyond it."""
+    n, s = 2 * p, 2 * p + 1
+    if state == OPEN:
+        return g[n]
+    if state == STICK:
+        return -mu[p] * lam[n] - slip_sign(to) * lam[s]
+    if to == OPEN:
+        return -lam[n]
+    return slip_sign(state) * (g[s] - lam[s] / k_s[p] - slip[p])
+
+
+@kernel
+def _borders(state, mu):
+    """The states next to `state`, -1 where there is none: an open point closes sliding, a sticking one slides first."""
+    if state == OPEN:
+        return SLIP_FORWARD, -1
+    if state == STICK:
+        return SLIP_FORWARD, SLIP_BACKWARD
+    return OPEN, (STICK if mu > 0.0 else -1)
+
+
+@kernel
+def follow(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, work, max_pieces):
+    """Follow the solution from all points open, g_free pushed apart, to g_free itself, a border of states at a time.
+
+    The law is piecewise linear, so the path is a chain of straight pieces, each a direct solve at both ends; it cannot return
+    to its start, where the solution is unique, nor run away, so it arrives. `state` receives the states found.
+    """
+    size = 0.0
+    for p in range(state.shape[0]):
+        size = max(size, abs(g_free[2 * p]) + abs(g_free[2 * p + 1]) + abs(slip[p]))
+    work.far[:] = g_free
+    for p in range(state.shape[0]):
+        work.far[2 * p] += 3.0 * (1.0 + mu[p]) * size
+    state[:] = OPEN
+    moved, came_from, forwards = -1, OPEN, True
+    for _ in range(max_pieces):
+        solved = direct(
+            G, work.far, k_n, k_s, mu, slip, state, work.far_gap, work.far_force, lu, pivot, factored, work.unknown, work.product
+        )
+        solved += direct(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, work.unknown, work.product)
+        if not np.isfinite(solved):
+            return False
+        if moved >= 0:
+            back = SLIP_FORWARD if state[moved] == OPEN else came_from
+            forwards = _margin(moved, back, state[moved], g, lam, slip, k_s, mu) > _margin(
+                moved, back, state[moved], work.far_gap, work.far_force, slip, k_s, mu
+            )
+        best, point, following = (1.0 if forwards else -np.inf), -1, OPEN
+        for p in range(state.shape[0]):
+            for to in _borders(state[p], mu[p]):
+                if to < 0 or (p == moved and (to == came_from or state[p] == OPEN)):
+                    continue
+                far = _margin(p, to, state[p], work.far_gap, work.far_force, slip, k_s, mu)
+                near = _margin(p, to, state[p], g, lam, slip, k_s, mu)
+                slope = near - far
+                if slope == 0.0 or (slope < 0.0) != forwards:
+                    continue
+                t = -far / slope
+                if (forwards and t < best) or (not forwards and t > best):
+                    best, point, following = t, p, to
+        if point < 0:
+            return forwards
+        s = 2 * point + 1
+        if state[point] == OPEN:
+            above = work.far_gap[s] + best * (g[s] - work.far_gap[s]) > slip[point]
+            following = SLIP_FORWARD if above else SLIP_BACKWARD
+        moved, came_from = point, state[point]
+        state[point] = np.int8(following)
+    return False

@@ -1,0 +1,442 @@
+"""The dataset: what the schema promises is there, describes itself, survives netCDF, and says nothing that was not computed."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from pint import UnitRegistry
+
+from engine import Status
+from studies import make_study, run_study, write_dataset
+from studies.dataset import COORDINATES, SCHEMA, study_hash
+
+from .conftest import LOOSE, SHORT, study_of
+
+PROMISED = {
+    "displacement": ("time", "point", "component"),
+    "stress": ("time", "point", "stress_component"),
+    "racking": ("time",),
+    "racking_shear": ("time",),
+    "open_fraction": ("time",),
+    "slip_fraction": ("time",),
+    "max_opening": ("joint",),
+    "max_slip": ("joint",),
+    "max_pressure": ("joint",),
+    "peak_displacement": ("point", "component"),
+    "peak_displacement_dynamic": ("point", "component"),
+    "peak_stress": ("point", "stress_component"),
+    "peak_stress_dynamic": ("point", "stress_component"),
+    "peak_racking": (),
+    "peak_racking_dynamic": (),
+    "status": (),
+    "reason": (),
+    "iterations": (),
+    "residual": (),
+    "energy_error": (),
+    "contact_drift": (),
+    "penetration": (),
+    "frequency": ("mode",),
+    "closed_before_shaking": (),
+    "uplift_over_weight": (),
+}
+"""The table of DESIGN section 5."""
+
+UNITS = {
+    "displacement": "m",
+    "stress": "Pa",
+    "racking": "m",
+    "open_fraction": "1",
+    "max_opening": "m",
+    "max_pressure": "Pa",
+    "peak_stress": "Pa",
+    "energy_error": "1",
+    "penetration": "m",
+    "frequency": "Hz",
+    "base_acceleration": "m/s2",
+    "closed_before_shaking": "1",
+}
+MESH = {"mesh", "mesh_face_nodes", "mesh_layer", "joint_nodes"}
+NOT_OF_THE_RESPONSE = {
+    "status",
+    "reason",
+    "racking_free_field",
+    "peak_racking_free_field",
+    "frequency",
+    "base_acceleration",
+    "peak_base_acceleration",
+    "uplift_over_weight",
+}
+"""Known of a case before it is marched: kept where it fails."""
+
+
+def attributes(ds):
+    """Every attribute of the dataset and its variables, with the name of its owner."""
+    yield from (("", name, value) for name, value in ds.attrs.items())
+    for owner in ds.variables:
+        yield from ((owner, name, value) for name, value in ds[owner].attrs.items())
+
+
+def swept(sweep, extra=""):
+    """Dataset of a sweep on the coarse mesh."""
+    return run_study(study_of(f"{SHORT}{extra}[sweep]\n{sweep}"), workers=1)
+
+
+@pytest.mark.parametrize(("name", "dims"), PROMISED.items(), ids=PROMISED)
+def test_the_designs_table_is_there(name, dims, quick_ds):
+    assert quick_ds[name].dims == ("p0", *dims)
+
+
+@pytest.mark.parametrize(("name", "dim"), [("base_acceleration", "time")])
+def test_the_motion_is_there(name, dim, quick_ds):
+    """Their axes are those of the motion alone, or all (DESIGN section 5)."""
+    assert dim in quick_ds[name].dims
+
+
+@pytest.mark.parametrize("name", SCHEMA)
+def test_every_variable_has_its_dims_and_describes_itself(name, quick_ds):
+    variable = SCHEMA[name]
+    assert quick_ds[name].dims == ("p0", *variable.dims)
+    assert quick_ds[name].attrs.get("units", "") == variable.unit
+    assert quick_ds[name].attrs["long_name"] == variable.long_name
+    assert len(variable.long_name) > 5
+
+
+@pytest.mark.parametrize(("name", "unit"), UNITS.items(), ids=UNITS)
+def test_units_are_si(name, unit, quick_ds):
+    assert quick_ds[name].attrs["units"] == unit
+
+
+def test_nothing_else_gets_in(quick_ds):
+    assert set(quick_ds.data_vars) == set(SCHEMA) | MESH
+
+
+@pytest.mark.parametrize("name", COORDINATES)
+def test_coordinates_describe_themselves(name, quick_ds):
+    coordinate = COORDINATES[name]
+    assert quick_ds.coords[name].dims == coordinate.dims
+    assert quick_ds[name].attrs["long_name"] == coordinate.long_name
+
+
+def test_every_unit_is_one(reopened):
+    registry = UnitRegistry()
+    units = {value for _, name, value in attributes(reopened) if name == "units"}
+    assert {"m", "Pa", "s", "Hz", "m/s2", "1"} <= units
+    for unit in units - {"1", "m/s2"}:
+        assert registry.parse_units(unit)
+
+
+def test_swept_fields_are_coordinates_with_unit_and_meaning(reopened):
+    p0 = reopened["p0"]
+    assert p0.values.tolist() == pytest.approx([0.0, 2e4, np.sqrt(2e4 * 4e6), 4e6], rel=1e-14)  # a geometric sequence
+    assert p0.attrs["units"] == "Pa"
+    assert p0.attrs["long_name"] == "pressure at the reference height"
+
+
+def test_attributes_are_text_and_numbers_only(quick_ds, reopened):
+    """No bool, None or dict: netCDF knows none of them."""
+    for ds in (quick_ds, reopened):
+        for owner, name, value in attributes(ds):
+            assert isinstance(value, (str, np.integer, np.floating)), f"{owner}.{name} = {value!r}"
+
+
+def test_provenance(reopened, quick):
+    attrs = reopened.attrs
+    assert attrs["Conventions"].startswith("CF-1.11")
+    assert "UGRID-1.0" in attrs["Conventions"]
+    assert (attrs["title"], attrs["study_name"], attrs["study"]) == ("Quick", "quick", quick.text)
+    assert attrs["study_hash"] == study_hash(quick)
+    assert attrs["records_sha256"].startswith("ridgecrest-2019-clc-360.AT2 ")
+    assert len(attrs["records_sha256"].split()[1]) == 64
+    for package in ("coralquake", "numpy", "numba", "scipy", "xarray", "netCDF4"):
+        assert f"{package} " in attrs["package_versions"]
+    assert {"commit", "created", "history"} <= attrs.keys()
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"title": "Other"},
+        {"pressure": {"p0": 0}},
+        {"sweep": {"scale": [1]}},
+        {"motion": {"record": "ridgecrest-2019-clc-090.AT2"}},
+        {"sweep": {"scale": [1.0]}, "time": {"dt": "1 ms"}},
+    ],
+    ids=str,
+)
+def test_hash_of_a_study_changes_with_what_decides_its_result(changed):
+    assert study_hash(make_study(changed)) != study_hash(make_study({}))
+    assert study_hash(make_study(changed)) == study_hash(make_study(changed))
+
+
+def test_round_trip_through_netcdf(quick_ds, reopened):
+    xr.testing.assert_equal(quick_ds, reopened)
+    assert dict(quick_ds.sizes) == dict(reopened.sizes)
+    for name in quick_ds.variables:
+        assert dict(quick_ds[name].attrs) == dict(reopened[name].attrs)
+
+
+def test_a_case_is_chosen_as_the_readme_says(quick_file):
+    with xr.open_dataset(quick_file) as ds:
+        chosen = ds.sel(p0=2e6, method="nearest").sel(point="A").displacement
+        assert chosen.dims == ("time", "component")
+        assert float(chosen["p0"]) == pytest.approx(np.sqrt(2e4 * 4e6), rel=1e-14)
+        assert np.isfinite(chosen.values).all()
+        assert (float(chosen["point_x"]), float(chosen["point_y"])) == (0.0, -4.0)
+
+
+# one case against itself -----------------------------------------------------------------------------------------------
+
+
+def test_named_points_lie_where_the_design_says(reopened):
+    places = {
+        name: (float(x), float(y))
+        for name, x, y in zip(reopened["point"].values, reopened["point_x"], reopened["point_y"], strict=True)
+    }
+    expected = {"A": (0, -4), "B": (2.5, -6), "C": (-2.5, -6), "D": (0, -8), "S": (0, 0), "F": (10, 0)}
+    assert places == {name: pytest.approx(place, abs=1e-12) for name, place in expected.items()}
+
+
+def test_further_points_are_recorded():
+    ds = swept("p0 = [0]", '[output.points]\ndeep = ["5 m", "-12 m"]\n')
+    assert (float(ds.sel(point="deep").point_x), float(ds.sel(point="deep").point_y)) == (5.0, -12.0)
+    assert np.isfinite(ds["displacement"].sel(point="deep")).all()
+
+
+def test_time_starts_at_zero_and_keeps_every_second_step(quick_ds):
+    np.testing.assert_allclose(quick_ds["time"], np.arange(21) * 0.02, rtol=0, atol=1e-15)
+
+
+def test_base_acceleration_is_that_of_the_study(quick_ds, quick):
+    for case in range(4):
+        np.testing.assert_array_equal(quick_ds["base_acceleration"][case], quick.ground(case)[::2])
+        assert float(quick_ds["peak_base_acceleration"][case, 0]) == pytest.approx(1.7085, rel=1e-14)
+
+
+def test_peaks_see_every_step(quick_ds):
+    for name in ("displacement", "stress", "racking", "racking_shear"):
+        history = np.abs(quick_ds[name]).max("time")
+        assert (quick_ds[f"peak_{name}"] >= history).all()
+    assert (quick_ds["max_opening"] >= quick_ds["gap_before_shaking"]).all()
+    assert (quick_ds["max_pressure"] >= 0).all()
+
+
+def test_peaks_are_those_of_the_history_where_every_step_is_kept():
+    ds = swept('p0 = [0, "4 MPa"]', "[output]\nevery = 1\n")
+    for name in ("displacement", "stress"):
+        history = ds[name]
+        np.testing.assert_array_equal(ds[f"peak_{name}"], np.abs(history).max("time"))
+        np.testing.assert_array_equal(ds[f"peak_{name}_dynamic"], np.abs(history - history.isel(time=0)).max("time"))
+    np.testing.assert_array_equal(ds["peak_racking"], np.abs(ds["racking"]).max("time"))
+    np.testing.assert_allclose(ds["peak_racking_free_field"], np.abs(ds["racking_free_field"]).max("time"), rtol=1e-14)
+    moment = np.abs(ds["racking"]).argmax("time")
+    np.testing.assert_array_equal(ds["shape_time"], ds["time"].values[moment])
+
+
+def test_fractions_and_static_state_agree(quick_ds):
+    at_start = 1 - quick_ds["open_fraction"].isel(time=0)
+    # both are sums of the same lengths in another order
+    np.testing.assert_allclose(quick_ds["closed_before_shaking"], at_start, rtol=0, atol=1e-14)
+    assert (quick_ds["open_fraction"] + quick_ds["slip_fraction"] <= 1 + 1e-14).all()
+
+
+def test_first_slip_comes_within_the_motion(quick_ds):
+    times = quick_ds["first_slip"].values
+    known = times[~np.isnan(times)]
+    assert known.size
+    assert (known > 0).all()
+    assert (known <= 0.4).all()
+
+
+def test_joint_runs_round_the_box(quick_ds):
+    ds = quick_ds
+    assert float(ds["joint_length"].sum()) == pytest.approx(18.0, rel=1e-14)  # 2 (5 m + 4 m)
+    lines = {
+        "floor": ("joint_y", -8.0),
+        "roof": ("joint_y", -4.0),
+        "left wall": ("joint_x", -2.5),
+        "right wall": ("joint_x", 2.5),
+    }
+    assert set(ds["joint_side"].values) == set(lines)
+    for side, (coordinate, place) in lines.items():
+        on = ds["joint_side"].values == side
+        assert ds[coordinate].values[on] == pytest.approx(place, abs=1e-12)
+    start = {"floor": 0.0, "right wall": 5.0, "roof": 9.0, "left wall": 14.0}
+    for side, begin in start.items():
+        arc = ds["joint_arc"].values[ds["joint_side"].values == side]
+        assert arc.min() == pytest.approx(begin, abs=1e-12)
+
+
+def test_uplift_over_weight_is_the_closed_form(quick_ds):
+    """p0 (height/H_ref) width over the weight of 8 m² of concrete; 2.857 MN/m at 2 MPa (DESIGN section 1)."""
+    expected = quick_ds["p0"] * 4 / 14 * 5 / (8 * 2500 * 9.81)
+    np.testing.assert_allclose(quick_ds["uplift_over_weight"], expected, rtol=1e-12, atol=1e-15)  # sums of a few nodes' forces
+
+
+def test_energy_closes(quick_ds):
+    assert (quick_ds["energy_error"] <= 1e-9).all()  # (D11)
+
+
+def test_a_case_without_motion_has_no_energy_error():
+    """At rest there is nothing to divide by: 0/0 counts as met."""
+    ds = swept("scale = [0, 1]")
+    assert (ds["energy_error"] <= 1e-9).all()  # (D11)
+
+
+# mesh ----------------------------------------------------------------------------------------------------------------------
+
+
+def test_mesh_is_ugrid(reopened):
+    mesh = reopened["mesh"].attrs
+    assert (mesh["cf_role"], mesh["topology_dimension"]) == ("mesh_topology", 2)
+    faces = reopened[mesh["face_node_connectivity"]]
+    x, y = (reopened[name] for name in mesh["node_coordinates"].split())
+    assert (x.dims, y.dims, faces.dims[0]) == (("node",), ("node",), mesh["face_dimension"])
+    assert faces.attrs["cf_role"] == "face_node_connectivity"
+    corners = faces.values - faces.attrs["start_index"]
+    assert (corners.min(), corners.max()) == (0, reopened.sizes["node"] - 1)
+    (x1, x2, x3), (y1, y2, y3) = x.values[corners.T], y.values[corners.T]
+    areas = ((x2 - x1) * (y3 - y1) - (x3 - x1) * (y2 - y1)) / 2
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(20 * 14 - 4 * 3, rel=1e-12)  # the domain less the void
+
+
+@pytest.mark.parametrize(("name", "location"), [("mesh_layer", "face"), ("shape", "node")])
+def test_variables_on_the_mesh_say_so(name, location, reopened):
+    """UGRID-1.0 links a variable to its topology by `mesh` and `location`; readers find it by them."""
+    assert (reopened[name].attrs.get("mesh"), reopened[name].attrs.get("location")) == ("mesh", location)
+
+
+def test_layers_of_the_mesh_are_those_of_the_study(reopened):
+    y = reopened["mesh_node_y"].values[reopened["mesh_face_nodes"].values].mean(axis=1)
+    layer = reopened["mesh_layer"].values
+    ground = layer < 5
+    assert (layer == 5).sum() == 32
+    np.testing.assert_array_equal(layer[ground], np.searchsorted([1, 4, 8, 10], -y[ground]))
+
+
+def test_joint_nodes_lie_on_each_other(reopened):
+    places = np.stack([reopened["mesh_node_x"], reopened["mesh_node_y"]], axis=1)[reopened["joint_nodes"].values]
+    np.testing.assert_array_equal(places[:, 0], places[:, 3])
+    np.testing.assert_array_equal(places[:, 1], places[:, 2])
+
+
+# sweeps that change the mesh or the step -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sweep", ['["15 m", "30 m"]', '["30 m", "15 m"]'])
+def test_every_case_of_a_mesh_sweep_has_its_own_nodes(sweep):
+    """The shape of a case belongs to nodes whose coordinates the dataset holds (DESIGN section 5: the mesh per distinct mesh)."""
+    ds = swept(f"domain_width = {sweep}")
+    for width in ds["domain_width"].values:
+        case = ds.sel(domain_width=width)
+        known = np.isfinite(case["shape"]).all("component").values
+        x = case["mesh_node_x"].values
+        assert np.nanmax(x[known]) == pytest.approx(width / 2, rel=1e-14)
+        np.testing.assert_array_equal(np.isfinite(x), known)
+
+
+def test_joint_coordinates_carry_the_axis_where_they_vary():
+    ds = swept('box_width = ["5 m", "6 m"]')
+    for width in (5.0, 6.0):
+        assert float(ds["joint_x"].sel(box_width=width).max()) == pytest.approx(width / 2, rel=1e-14)
+        assert float(ds["point_x"].sel(box_width=width, point="B")) == pytest.approx(width / 2, rel=1e-14)
+
+
+def test_joint_is_padded_where_the_number_of_its_points_varies():
+    """20 elements: 20 points of one each, or 24 at their nodes, two at a corner (D3)."""
+    ds = swept('quadrature = ["one-point", "nodal"]')
+    counts = np.isfinite(ds["max_pressure"]).sum("joint")
+    assert counts.values.tolist() == [20, 24]
+
+
+def test_histories_of_several_steps_are_on_the_coarsest_grid():
+    ds = swept('dt = ["10 ms", "5 ms"]')
+    np.testing.assert_allclose(ds["time"], np.arange(21) * 0.02, rtol=0, atol=1e-15)
+    fine = swept('dt = ["5 ms"]')
+    own = fine["displacement"].isel(dt=0).sel(time=ds["time"].values, method="nearest")
+    np.testing.assert_allclose(ds["displacement"].sel(dt=0.005).values, own.values, rtol=1e-12, atol=1e-18)  # interpolated there
+    assert np.isfinite(ds["displacement"]).all()
+
+
+@pytest.mark.parametrize("sweep", ['["0.2 s", "0.4 s"]', '["0.4 s", "0.2 s"]'])
+def test_histories_are_nan_after_a_cases_end(sweep):
+    ds = swept(f"duration = {sweep}")
+    assert float(ds["time"][-1]) == pytest.approx(0.4, abs=1e-12)
+    short, long = ds.sel(duration=0.2), ds.sel(duration=0.4)
+    after = ds["time"].values > 0.2 + 1e-9
+    for name in ("displacement", "racking", "open_fraction", "base_acceleration"):
+        assert np.isnan(short[name].values[after]).all()
+        assert np.isfinite(short[name].values[~after]).all()
+        assert np.isfinite(long[name]).all()
+    assert np.isfinite(ds["peak_racking"]).all()
+
+
+@pytest.mark.parametrize(("duration", "steps"), [("0.3 s", (0.01, 0.003)), ("0.7 s", (0.01, 0.007)), ("0.6 s", (0.012, 0.004))])
+def test_histories_that_end_together_have_no_gap_at_the_end(duration, steps):
+    """The last sample of a case is its own end, whatever rounding did to the times."""
+    sweep = ", ".join(f'"{step:g} s"' for step in steps)
+    text = SHORT.replace('"0.4 s"', f'"{duration}"').replace('dt = "0.01 s"\n', "")
+    ds = run_study(study_of(f"{text}[output]\nevery = 1\n[sweep]\ndt = [{sweep}]"), workers=1)
+    assert float(ds["time"][-1]) == pytest.approx(float(duration.split()[0]), abs=1e-12)
+    assert np.isfinite(ds["racking"]).all()
+
+
+def test_motions_are_those_of_their_own_case():
+    ds = swept('record = ["ridgecrest-2019-clc-360.AT2", "ridgecrest-2019-clc-090.AT2", "none"]')
+    assert ds["record"].values.tolist()[-1] == "none"
+    peaks = ds["peak_base_acceleration"].sel(component="x")
+    assert peaks.values == pytest.approx([1.7085, 1.7085, 0.0], rel=1e-14)
+    assert float(np.abs(ds["base_acceleration"][0] - ds["base_acceleration"][1]).max()) > 0.1
+    assert not ds["base_acceleration"].sel(record="none").any()
+
+
+def test_words_and_truth_values_survive_netcdf(tmp_path):
+    ds = swept('sides = ["tied", "roller"]\nself_weight = [true, false]')
+    write_dataset(ds, tmp_path / "x.nc")
+    read = xr.load_dataset(tmp_path / "x.nc", engine="netcdf4")
+    assert read["sides"].values.tolist() == ["tied", "roller"]
+    assert read["self_weight"].values.tolist() == [True, False]
+    assert read["racking"].sel(sides="roller", self_weight=True).dims == ("time",)
+
+
+def test_a_study_without_a_sweep_has_no_axes(tmp_path):
+    ds = run_study(study_of(SHORT), workers=1)
+    assert ds["displacement"].dims == SCHEMA["displacement"].dims
+    assert ds["status"].shape == ()
+    write_dataset(ds, tmp_path / "x.nc")
+    xr.testing.assert_equal(ds, xr.load_dataset(tmp_path / "x.nc", engine="netcdf4"))
+
+
+def test_two_axes_are_two_dimensions():
+    ds = swept('p0 = [0, "4 MPa"]\nscale = [0.5, 1, 2]')
+    assert ds["racking"].dims == ("p0", "scale", "time")
+    peaks = ds["peak_base_acceleration"].sel(component="x")
+    np.testing.assert_allclose(peaks, 1.7085 * np.array([[0.5, 1, 2]] * 2), rtol=1e-14)
+
+
+# failures ------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_failed_case_is_nan_with_status_and_reason(failing_ds):
+    lost = failing_ds.isel(p0=1)
+    assert int(lost["status"]) == Status.NO_EQUILIBRIUM
+    assert "no static equilibrium" in str(lost["reason"].values)
+    for name in set(SCHEMA) - NOT_OF_THE_RESPONSE:
+        assert np.isnan(lost[name]).all(), name
+    assert float(lost["uplift_over_weight"]) > 1
+
+
+def test_its_companion_is_untouched(failing_ds):
+    kept = failing_ds.isel(p0=0)
+    assert int(kept["status"]) == Status.DONE
+    assert str(kept["reason"].values) == ""
+    alone = run_study(study_of(f"{SHORT}{LOOSE}[sweep]\np0 = [0]"), workers=1).isel(p0=0)
+    for name in SCHEMA:
+        if alone[name].dtype.kind == "f":
+            np.testing.assert_array_equal(kept[name], alone[name], err_msg=name)
+
+
+def test_failures_survive_netcdf(failing_ds, tmp_path):
+    write_dataset(failing_ds, tmp_path / "x.nc")
+    read = xr.load_dataset(tmp_path / "x.nc", engine="netcdf4")
+    xr.testing.assert_equal(failing_ds, read)
+    assert "equilibrium" in read["status"].attrs["comment"]

@@ -1,0 +1,337 @@
+"""From a study file to cases and batches: units, ranges, names, order, sharing, and the files themselves."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine import LANES, Spec, build_model
+from studies import StudyError, load_study, make_study, shipped_studies
+
+from .conftest import QUICK, RECORD, study_of
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def axis(written, name="p0"):
+    """Values of the first axis of a sweep."""
+    return study_of(f"[sweep]\n{name} = {written}").axes[0].values
+
+
+def mistakes_of(source):
+    with pytest.raises(StudyError) as caught:
+        load_study(source)
+    return caught.value.mistakes
+
+
+@pytest.mark.parametrize(
+    ("text", "section", "field", "value"),
+    [
+        ('[pressure]\np0 = "200 N/cm**2"', "pressure", "p0", 2e6),
+        ('[motion]\npeak = "170.85 cm/s**2"', "motion", "peak", 1.7085),
+        ('[motion]\npeak = "0.2 g_0"', "motion", "peak", 0.2 * 9.80665),
+        ('[box]\nwidth = "600 cm"', "box", "width", 6.0),
+        ('[box]\nE = "34 GPa"', "box", "E", 34e9),
+        ('[box]\ndensity = "2.5 t/m**3"', "box", "density", 2500.0),
+        ('[box]\ndensity = "2500 kg/m^3"', "box", "density", 2500.0),
+        ("[box]\noffset = 0", "box", "offset", 0.0),
+        ('[box]\noffset = "-1 m"', "box", "offset", -1.0),
+        ('[damping]\nratio = "3 %"', "damping", "ratio", 0.03),
+        ('[time]\ndt = "5 ms"', "time", "dt", 0.005),
+        ('[time]\nduration = "0.5 min"', "time", "duration", 30.0),
+    ],
+)
+def test_quantities_become_si(text, section, field, value):
+    (spec,) = study_of(text).cases
+    assert getattr(getattr(spec, section), field) == pytest.approx(value, rel=1e-14)  # one product of floats
+
+
+def test_layers_replace_those_of_the_preset():
+    text = '[[layer]]\nbottom = "14 m"\nnu = 0.2\nfriction = 0.3\nVs = "300 m/s"\nunit_weight = "19.62 kN/m**3"\n'
+    (spec,) = study_of(text).cases
+    assert len(spec.layer) == 1
+    assert spec.layer[0].rho == pytest.approx(2000.0, rel=1e-14)
+    assert spec.layer[0].shear_modulus == pytest.approx(2000.0 * 300.0**2, rel=1e-14)
+
+
+def test_an_empty_file_is_the_reference_problem():
+    study = study_of("")
+    assert study.cases == (Spec(),)
+    assert study.shape == ()
+    assert study.label(0) == "the only case"
+
+
+@pytest.mark.parametrize(
+    ("written", "values"),
+    [
+        ('["1 MPa", "200 N/cm**2", 0]', [1e6, 2e6, 0.0]),
+        ('{ from = "1 MPa", to = "3 MPa", num = 3 }', [1e6, 2e6, 3e6]),
+        ('{ from = "3 MPa", to = "1 MPa", num = 3, spacing = "linear" }', [3e6, 2e6, 1e6]),
+        ('{ from = "1 kPa", to = "1 MPa", num = 4, spacing = "log" }', [1e3, 1e4, 1e5, 1e6]),
+        ('{ from = 0, to = "1 MPa", num = 2 }', [0.0, 1e6]),
+        ('[0, { from = "1 kPa", to = "100 kPa", num = 3, spacing = "log" }, "1 MPa"]', [0.0, 1e3, 1e4, 1e5, 1e6]),
+    ],
+)
+def test_lists_and_ranges_keep_their_order(written, values):
+    assert axis(written) == pytest.approx(values, rel=1e-14)  # powers in floating point
+
+
+def test_both_ends_of_a_logarithmic_range_are_exact():
+    values = axis('{ from = "0.02 MPa", to = "4 MPa", num = 8, spacing = "log" }')
+    assert (values[0], values[-1]) == (2e4, 4e6)
+
+
+def test_ranges_of_whole_numbers_are_whole():
+    study = study_of("[sweep]\nwall_elements = { from = 1, to = 3, num = 3 }")
+    assert [case.mesh.wall_elements for case in study.cases] == [1, 2, 3]
+
+
+def test_words_and_truth_values_can_be_swept():
+    study = study_of('[sweep]\nsides = ["tied", "roller"]\nself_weight = [true, false]')
+    assert [(case.supports.sides, case.gravity.self_weight) for case in study.cases] == [
+        ("tied", True),
+        ("tied", False),
+        ("roller", True),
+        ("roller", False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "field"),
+    [
+        ('p0 = ["1 MPa"]', "p0", "pressure.p0"),
+        ('pressure.p0 = ["1 MPa"]', "pressure_p0", "pressure.p0"),
+        ('pressure_p0 = ["1 MPa"]', "pressure_p0", "pressure.p0"),
+        ("scale = [2]", "scale", "motion.scale"),
+        ("damping_ratio = [0.1]", "damping_ratio", "damping.ratio"),
+        ('domain_width = ["15 m"]', "domain_width", "domain.width"),
+        ('layer.2.E = ["1 GPa"]', "layer_2_E", "layer.2.E"),
+        ('[sweep.pressure]\np0 = ["1 MPa"]', "pressure_p0", "pressure.p0"),
+        ('[sweep.layer.2]\nE = ["1 GPa"]', "layer_2_E", "layer.2.E"),
+    ],
+)
+def test_keys_of_the_sweep(key, name, field):
+    """A key is a short or dotted name; dimensions are called as written, with underscores (DESIGN section 5)."""
+    (found,) = study_of(key if key.startswith("[") else f"[sweep]\n{key}").axes
+    assert (found.name, found.field.name) == (name, field)
+
+
+def test_layer_of_a_dotted_key_is_the_one_that_changes():
+    study = study_of('[sweep]\nlayer.2.E = ["1 GPa", "2 GPa"]')
+    assert [case.layer[1].E for case in study.cases] == [1e9, 2e9]
+    assert {case.layer[0] for case in study.cases} == {Spec().layer[0]}
+
+
+def test_cases_run_through_the_grid_with_the_last_axis_fastest():
+    study = study_of('[sweep]\nscale = [1, 2]\np0 = ["1 MPa", "2 MPa", "3 MPa"]\ndamping_ratio = [0.02, 0.05]')
+    assert [a.name for a in study.axes] == ["scale", "p0", "damping_ratio"]
+    assert study.shape == (2, 3, 2)
+    assert len(study.cases) == 12
+    for i, case in enumerate(study.cases):
+        scale, p0, ratio = np.unravel_index(i, study.shape)
+        expected = (study.axes[0].values[scale], study.axes[1].values[p0], study.axes[2].values[ratio])
+        assert (case.motion.scale, case.pressure.p0, case.damping.ratio) == expected
+    assert study.label(1) == "scale = 1, p0 = 1e+06 Pa, damping_ratio = 0.05"
+
+
+@pytest.mark.parametrize(
+    "sweep",
+    [
+        'p0 = [0, "1 MPa"]',
+        "scale = [1, 2]",
+        'peak = ["1 m/s**2", "2 m/s**2"]',
+        'record = ["ridgecrest-2019-clc-360.AT2", "ridgecrest-2019-clc-090.AT2", "none"]',
+        "self_weight = [true, false]",
+        "layer.3.friction = [0.2, 0.4]",
+        'reference_height = ["10 m", "14 m"]',
+        'p0 = [0, "1 MPa"]\nscale = [1, 2]\nlayer.3.friction = [0.2, 0.4]',
+    ],
+)
+def test_cases_that_differ_in_loads_and_friction_share_a_batch(sweep):
+    study = study_of(f"[sweep]\n{sweep}")
+    (batch,) = study.batches
+    assert batch.cases == tuple(range(len(study.cases)))
+
+
+@pytest.mark.parametrize(
+    "sweep",
+    [
+        'domain_width = ["15 m", "20 m"]',
+        'dt = ["5 ms", "2.5 ms"]',
+        'duration = ["10 s", "20 s"]',
+        "damping_ratio = [0.02, 0.05]",
+        'layer.3.E = ["1 GPa", "2 GPa"]',
+        'thickness = ["0.05 m", "0.1 m"]',
+        'sides = ["tied", "roller"]',
+        "wall_elements = [1, 2]",
+        "every = [1, 2]",
+    ],
+)
+def test_cases_that_differ_in_anything_else_do_not(sweep):
+    study = study_of(f"[sweep]\n{sweep}")
+    assert [batch.cases for batch in study.batches] == [(0,), (1,)]
+
+
+def test_a_batch_holds_at_most_as_many_cases_as_there_are_lanes():
+    study = study_of('[sweep]\np0 = { from = 0, to = "1 MPa", num = 21 }\ndamping_ratio = [0.02, 0.05]')
+    assert [len(batch.cases) for batch in study.batches] == [LANES, 21 - LANES, LANES, 21 - LANES]
+    assert sorted(case for batch in study.batches for case in batch.cases) == list(range(42))
+    for batch in study.batches:
+        assert len({study.cases[case].damping.ratio for case in batch.cases}) == 1
+
+
+def test_ground_is_scaled_to_the_peak_and_lasts_the_duration(quick):
+    ground = quick.ground(0)
+    assert ground.shape == (41, 2)
+    assert np.abs(ground).max(axis=0) == pytest.approx([1.7085, 0.0], rel=1e-14)  # one quotient and one product
+
+
+def test_a_record_beside_the_study_comes_before_those_shipped(tmp_path):
+    (tmp_path / "ridgecrest-2019-clc-360.AT2").write_text(RECORD)
+    (tmp_path / "mine.toml").write_text('[time]\nduration = "0.04 s"\ndt = "0.01 s"\n')
+    (motion,) = load_study(tmp_path / "mine.toml").motions.values()
+    assert len(motion.acceleration) == 5
+
+
+def test_records_are_found_in_folders_beside_the_study(tmp_path):
+    (tmp_path / "motions").mkdir()
+    (tmp_path / "motions" / "mine.AT2").write_text(RECORD)
+    (tmp_path / "mine.toml").write_text('[motion]\nrecord = "motions/mine.AT2"\n')
+    (motion,) = load_study(tmp_path / "mine.toml").motions.values()
+    assert motion.peak == pytest.approx(0.2 * 9.80665, rel=1e-14)  # the file is in g
+
+
+def test_the_vertical_record_shakes_the_vertical_direction():
+    text = '[motion]\nvertical_record = "ridgecrest-2019-clc-up.AT2"\nvertical_peak = "0.5 m/s**2"\nscale = 2\n'
+    ground = study_of(text).ground(0)
+    assert np.abs(ground).max(axis=0) == pytest.approx([3.417, 1.0], rel=1e-14)
+
+
+def test_no_record_is_no_motion():
+    assert not study_of('[motion]\nrecord = "none"\n').ground(0).any()
+
+
+# files ---------------------------------------------------------------------------------------------------------------------
+
+
+def test_the_path_gives_name_and_text(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(QUICK)
+    study = load_study(path)
+    assert (study.name, study.title, study.text) == ("mine", "Quick", QUICK)
+
+
+def test_without_a_title_the_name_stands_for_it(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("")
+    assert load_study(str(path)).title == "mine"
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"\xef\xbb\xbf" + 'title = "Hầm"'.encode(),
+        'title = "Hầm"\r\n'.encode(),
+        'title = "Hầm" # no line end'.encode(),
+    ],
+    ids=["byte-order mark", "Windows line ends", "no line end"],
+)
+def test_files_of_other_editors_are_read(raw, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(raw)
+    assert load_study(path).title == "Hầm"
+
+
+@pytest.mark.parametrize(
+    ("raw", "reason"),
+    [
+        ('title = "é"'.encode("latin-1"), "is not UTF-8 text"),
+        ('title = "x"'.encode("utf-16"), "is not UTF-8 text"),
+        (bytes(range(256)), "is not UTF-8 text"),
+        (b"a = ", "is not valid TOML"),
+        (b"[box]\nnu = 0.2\nnu = 0.3", "is not valid TOML"),
+        (b'title = "a\x00b"', "is not valid TOML"),
+        (b"a = " + b"[" * 5000 + b"]" * 5000, "nested too deeply"),
+        (b"a" + b".a" * 3000 + b" = 1", "bad.toml"),
+        (b"[sweep]\na" + b".a" * 3000 + b" = 1", "bad.toml"),
+        (b"#" * 1_000_001, "is larger than 1 MB"),
+    ],
+    ids=[
+        "latin-1",
+        "utf-16",
+        "binary",
+        "not TOML",
+        "key twice",
+        "zero byte",
+        "brackets",
+        "dotted key",
+        "dotted key of the sweep",
+        "large",
+    ],
+)
+def test_files_that_hold_no_study_are_told_in_one_line(raw, reason, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_bytes(raw)
+    (line,) = mistakes_of(path)
+    assert line.startswith("bad.toml: ")
+    assert reason in line
+
+
+def test_a_folder_is_no_study(tmp_path):
+    (line,) = mistakes_of(tmp_path)
+    assert line == f"{tmp_path.name}: is a folder; name the study file in it"
+
+
+@pytest.mark.parametrize("name", ["nix", "nix.toml", "nowhere/p0.toml", "x" * 5000])
+def test_a_missing_file_is_told_with_the_shipped_names(name):
+    (line,) = mistakes_of(name)
+    assert line.startswith(f'"{name[:50]}')
+    assert "there is no such file, nor a shipped study of that name (p0, paper" in line
+
+
+# shipped studies -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", shipped_studies())
+def test_shipped_studies_load(name):
+    study = load_study(name)
+    assert study.name == name
+    assert study.title
+    assert study.cases
+
+
+def test_p0_is_swept_from_none_to_twice_the_sources():
+    study = load_study("p0")
+    (found,) = study.axes
+    assert (found.name, len(found.values), len(study.batches)) == ("p0", 9, 1)
+    assert (found.values[0], found.values[1], found.values[-1]) == (0.0, 2e4, 4e6)
+    steps = np.diff(np.log(found.values[1:]))
+    assert np.ptp(steps) <= 1e-12  # logarithmic: equal steps to rounding
+
+
+def test_paper_has_the_sources_mesh():
+    """32 structure, 20 joint elements of one point; 132 in the ground, of which the source has 134 (DESIGN section 1)."""
+    (spec,) = load_study("paper").cases
+    model = build_model(spec)
+    mesh = model.system.mesh
+    assert (int(mesh.structure.sum()), len(mesh.joints), int((~mesh.structure).sum())) == (32, 20, 132)
+    assert len(model.system.points) == 20
+    assert (spec.joint.quadrature, spec.joint.thickness_ratio) == ("one-point", 0.1)
+
+
+def test_paper_keeps_the_sources_numbers():
+    """DESIGN section 1, reference problem."""
+    (spec,) = load_study("paper").cases
+    assert (spec.time.dt, spec.time.duration, spec.damping.ratio, spec.damping.joints) == (0.02, 20.0, 0.05, True)
+    assert (spec.pressure.p0, spec.supports.sides, spec.gravity.self_weight) == (2e6, "shear", False)
+    assert (spec.domain.width, spec.domain.depth) == (20.0, 14.0)
+    assert spec.motion.peak == pytest.approx(1.7085, rel=1e-14)
+
+
+def test_studies_in_the_readme_are_valid():
+    blocks = re.findall(r"```toml\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert blocks
+    for block in blocks:
+        assert make_study(tomllib.loads(block)).cases

@@ -1,0 +1,173 @@
+"""The runner: the same bits whatever the number of processes, whole files or none, progress that adds up."""
+
+import multiprocessing
+import os
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import studies
+from engine import Status, build_model
+from studies import run_study, write_dataset
+from studies.run import ONE_THREAD, run_batch, uplift_over_weight
+
+from .conftest import QUICK, SHORT, study_of
+
+TWO_BATCHES = f'{SHORT}[sweep]\np0 = [0, "0.2 MPa", "4 MPa"]\ndamping_ratio = [0.02, 0.05]\n'
+
+RUNNER = sys.modules["studies.run"]
+"""The module: the package's attribute of that name is its function."""
+
+
+def assert_same_bits(left, right):
+    """Equal in every value, NaN in the same places, and in all that describes them but the time of the run."""
+    assert set(left.variables) == set(right.variables)
+    for name in left.variables:
+        assert left[name].dims == right[name].dims
+        np.testing.assert_array_equal(left[name].values, right[name].values, err_msg=name)
+        assert left[name].attrs == right[name].attrs
+    moving = ("created", "history")
+    assert {k: v for k, v in left.attrs.items() if k not in moving} == {k: v for k, v in right.attrs.items() if k not in moving}
+
+
+def test_two_processes_give_the_bits_of_one():
+    study = study_of(TWO_BATCHES)
+    assert len(study.batches) == 2
+    environment = dict(os.environ)
+    told = []
+    together = run_study(study, workers=2, progress=told.append)
+    assert_same_bits(run_study(study, workers=1), together)
+    assert sum(told) == 6 * 40  # six cases of forty steps
+    assert dict(os.environ) == environment
+
+
+def test_a_second_run_gives_the_same_bits(quick, quick_ds):
+    assert_same_bits(quick_ds, run_study(quick, workers=1))
+
+
+@pytest.mark.parametrize("case", range(4))
+def test_a_case_alone_gives_the_bits_of_the_case_in_company(case, quick, quick_ds):
+    outcome = run_batch([quick.cases[case]], [quick.ground(case)])
+    for name, values in outcome.arrays.items():
+        if name in quick_ds and values.dtype.kind == "f" and name != "time":
+            np.testing.assert_array_equal(values[0], quick_ds[name].values[case], err_msg=name)
+
+
+def test_progress_counts_every_step_of_every_case(quick):
+    told = []
+    run_study(quick, workers=1, progress=told.append)
+    assert sum(told) == 4 * 40
+    assert min(told) >= 0
+
+
+def test_progress_counts_a_batch_to_its_end_where_all_its_cases_fail():
+    study = study_of(
+        SHORT + '[box]\ndepth = "0 m"\n[[layer]]\nbottom = "14 m"\nnu = 0.2\nE = "1 GPa"\nfriction = 0\ndensity = "2 t/m**3"\n'
+    )
+    told = []
+    ds = run_study(study, workers=1, progress=told.append)
+    assert int(ds["status"]) == 4
+    assert sum(told) == 40
+
+
+def test_processes_are_started_with_one_thread_each():
+    assert set(ONE_THREAD) == {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"}
+    assert set(ONE_THREAD.values()) == {"1"}
+
+
+def test_run_takes_a_path(tmp_path, quick_ds):
+    path = tmp_path / "quick.toml"
+    path.write_text(QUICK)
+    assert_same_bits(quick_ds, studies.run(path, workers=1))
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_run_of_a_wrong_study_raises(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text("[box]\nnu = 0.7\n")
+    with pytest.raises(studies.StudyError, match=r"bad.toml: box.nu = 0.7: must be less than 0.5"):
+        studies.run(path)
+
+
+@pytest.mark.parametrize("box", ["", '[box]\ndepth = "0 m"\n', '[box]\nwidth = "6 m"\nwall = "0.4 m"\noffset = "1 m"\n'])
+def test_uplift_is_the_resultant_of_the_pressure_over_the_weight(box):
+    """The closed form is what the assembled loads add up to."""
+    spec = study_of(SHORT + box + '[pressure]\np0 = "2 MPa"\n').cases[0]
+    model = build_model(spec)
+    vertical = model.system.expand.T @ np.tile([0.0, 1.0], len(model.system.mesh.nodes))
+    inner = (spec.box.width - 2 * spec.box.wall) * (spec.box.height - 2 * spec.box.wall)
+    weight = (spec.box.width * spec.box.height - inner) * spec.box.density * spec.gravity.acceleration
+    # linear pressure on straight edges is integrated exactly; the tolerance is that of a sum of a few forces
+    assert uplift_over_weight(spec) == pytest.approx(vertical @ model.pressure(spec) / weight, rel=1e-12)
+
+
+# lost batches ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_batch_that_cannot_be_built_does_not_stop_the_others(monkeypatch):
+    """Failed cases are NaN with status and reason; they never stop a study (DESIGN section 5)."""
+    built = RUNNER.build_model
+
+    def too_large(spec):
+        if spec.damping.ratio == 0.05:
+            raise MemoryError("no room for the mesh")
+        return built(spec)
+
+    monkeypatch.setattr(RUNNER, "build_model", too_large)
+    ds = run_study(study_of(TWO_BATCHES), workers=1)
+    assert (ds["status"].sel(damping_ratio=0.02) == Status.DONE).all()
+    assert (ds["status"].sel(damping_ratio=0.05) >= Status.NOT_CONVERGED).all()
+    assert np.isnan(ds["displacement"].sel(damping_ratio=0.05)).all()
+    assert all("no room for the mesh" in str(reason) for reason in ds["reason"].sel(damping_ratio=0.05).values)
+
+
+def test_killed_workers_lose_their_own_cases_at_most():
+    """Batches of killed workers are computed anew, or say that they were lost (DESIGN section 5, status 6)."""
+    killed = []
+
+    def kill_all(steps):
+        if not killed:
+            killed.extend(multiprocessing.active_children())
+            for worker in killed:
+                worker.kill()
+
+    text = f"{SHORT.replace('0.4 s', '4 s')}[sweep]\ndamping_ratio = [0.01, 0.02, 0.05, 0.1]\n"
+    ds = run_study(study_of(text), workers=2, progress=kill_all)
+    assert len(killed) == 2
+    lost = ds["status"] == Status.WORKER_LOST
+    assert ((ds["status"] == Status.DONE) | lost).all()
+    assert not lost.all()
+    assert np.isnan(ds["peak_racking"].values[lost.values]).all()
+
+
+# files ---------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_written_file_leaves_nothing_beside_it(quick_ds, tmp_path):
+    path = tmp_path / "deep" / "folder" / "quick.nc"
+    write_dataset(quick_ds, path)
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_failed_write_leaves_the_file_of_before(quick_ds, tmp_path, monkeypatch):
+    path = tmp_path / "quick.nc"
+    write_dataset(quick_ds, path)
+    before = path.read_bytes()
+
+    def full_disk(self, target, **kwargs):
+        target.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        write_dataset(quick_ds, path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_histories_are_compressed(quick_file):
+    with xr.open_dataset(quick_file) as ds:
+        assert ds["displacement"].encoding["zlib"] is True
+        assert ds["status"].dtype == np.int32

@@ -1,0 +1,407 @@
+"""The engine against `reference`, an independent one: matrices, the static stage, single steps from the same state, histories.
+
+Histories are compared only where the joints do not chatter; lift-off is chaotic, so there both are compared step by step.
+"""
+
+from collections import namedtuple
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import eigsh
+
+from engine import (
+    LANES,
+    Constraints,
+    JointMaterial,
+    Lanes,
+    Material,
+    Model,
+    Spec,
+    State,
+    Stepper,
+    build_model,
+    build_system,
+    equilibrium,
+    newmark_of,
+    simulate_cases,
+)
+from engine.model import materials
+from engine.spec import Box, Damping, Domain, Gravity, Joint, Layer, MeshOptions, Output, Pressure, Supports, Time
+
+from . import reference
+
+COARSE = MeshOptions(wall_elements=1, roof_elements=2, side_elements=2, first=1.5, growth=1.6, largest_width=4, largest_height=4)
+ASSEMBLY = 1e-12  # sums of some ten products, relative to the largest entry: rounding stays below a hundred units of 1e-16
+STEP = 1e-10  # both solve a step to a residual of 1e-12; a hundred for the condition of the equations
+STATIC = 1e-7  # D10 stops at a residual of 1e-10, and a box that hangs on few points is a thousand times softer than the whole
+STATIC_FORCE = 1e-6  # a gap under pressure is some 1e-5 of the displacements, which float by far more in the proximal steps
+HISTORY = 1e-8  # some hundred steps, each to 1e-12 or better, none amplified where no joint chatters
+
+MODELS = 12  # drawn at random, four cases each, six steps of each case
+
+Twin = namedtuple("Twin", "whole column point")
+"""The reference of a System; the engine's degree of freedom, and the engine's joint point, of each of its own."""
+
+Step = namedtuple("Step", "where error own states halved")
+"""One compared step: its error, and where that is beyond STEP the error of the reference when it starts from the engine's
+solution: within STEP, that is another solution of the same equations."""
+
+
+def twin_of(system, material_list, held, quadrature, lumped=False, thickness=1.0):
+    """Reference of a system, matched by the nodes that its degrees of freedom are and by the rows of its joint operator."""
+    whole = reference.assemble(system.mesh, material_list, held.fixed, held.master, quadrature, lumped, thickness)
+    column = np.array([system.expand[[owner]].indices[0] for owner in whole.owner])
+    rows = system.B.toarray()[::2][:, column]
+    point = np.full(len(whole.area), -1)
+    for p, row in enumerate(whole.B.toarray()[::2]):
+        same = (abs(rows - row).max(axis=1) < 1e-9) & (system.points.material == whole.material[p])
+        assert same.sum() == 1, "each of the reference's points is one of the engine's"
+        point[p] = int(np.argmax(same))
+    return Twin(whole, column, point)
+
+
+def twin_of_model(model):
+    spec, mesh = model.spec, model.system.mesh
+    held = Constraints.of_sides(mesh, spec.supports.sides)
+    return twin_of(model.system, materials(spec), held, spec.joint.quadrature, spec.mesh.mass == "lumped")
+
+
+def difference(a, b):
+    """Largest difference, relative to the largest entry of b."""
+    return abs(a - b).max() / max(abs(b).max(), 1e-300)
+
+
+# ---- matrices ----
+
+
+def check_matrices(system, twin):
+    whole, column = twin.whole, twin.column
+    assert sorted(column) == list(range(system.n_dof))
+    assert difference(system.expand.toarray()[:, column], whole.T.toarray()) == 0.0
+    for name in ("K", "M"):
+        assert difference(getattr(system, name).toarray()[:, column][column], getattr(whole, name).toarray()) < ASSEMBLY
+    assert difference(system.inertia.T[column], whole.inertia) < ASSEMBLY
+    assert difference(system.weight[column], -whole.inertia[:, 1]) < ASSEMBLY
+    area = np.bincount(twin.point, whole.area, minlength=len(system.points))
+    assert difference(area, system.points.area) < ASSEMBLY
+    B = system.B.toarray()[:, column].reshape(len(system.points), 2, -1)
+    assert difference(B[twin.point].reshape(whole.B.shape), whole.B.toarray()) < ASSEMBLY
+    pressure = np.random.default_rng(0).standard_normal(len(system.mesh.nodes))
+    load = reference.pressure_load(whole, system.mesh, pressure, system.thickness)
+    assert difference(system.pressure_load(pressure)[column], load) < ASSEMBLY
+
+
+SHIFTED = Spec(
+    domain=Domain(width=18, depth=15),
+    box=Box(offset=-1.3, depth=3.1, width=4.4, height=3.7, wall=0.4),
+    layer=tuple(
+        Layer(bottom=bottom, E=E, nu=nu, density=2000 + 100 * bottom, friction=0.1 * bottom)
+        for bottom, E, nu in ((2.0, 3e8, 0.2), (4.3, 2e9, 0.3), (5.9, 9e9, 0.1), (20.0, 4e9, 0.25))
+    ),
+    mesh=COARSE,
+)
+"""An offset box that two layer boundaries cut."""
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"joint": Joint(quadrature="one-point")},
+        {"mesh": COARSE.model_copy(update={"mass": "lumped"})},
+        {"supports": Supports(sides="roller"), "joint": Joint(thickness_ratio=0.1)},
+        {"supports": Supports(sides="shear"), "gravity": Gravity(self_weight=False)},
+        {"supports": Supports(sides="fixed"), "box": Box(depth=0.0, offset=0.7)},
+        {"damping": Damping(ratio=0.02, joints=True), "mesh": COARSE.model_copy(update={"wall_elements": 2, "roof_elements": 4})},
+    ],
+    ids=["tied", "one-point", "lumped", "roller-ratio", "shear", "fixed-at-surface", "joint-damping"],
+)
+def test_matrices_of_box_meshes_agree(changes):
+    model = build_model(Spec(**{**dict(SHIFTED), **changes}))
+    twin = twin_of_model(model)
+    check_matrices(model.system, twin)
+    joints = reference.joints_of(twin.whole, model.joint_materials(model.spec))
+    bonded = joints.matrix(twin.whole.K, np.full(len(joints.mu), reference.STICK))
+    omega = np.sqrt(np.sort(eigsh(bonded.tocsc(), 2, twin.whole.M.tocsc(), sigma=0, return_eigenvectors=False)))
+    beta = 2 * model.spec.damping.ratio / omega.sum()
+    # Lanczos and the shift-and-invert behind it keep some 1e-10 of the lowest
+    assert [model.rayleigh.alpha, model.rayleigh.beta] == pytest.approx([omega.prod() * beta, beta], rel=1e-9)
+    assert model.rayleigh.joints is model.spec.damping.joints
+    depth = np.clip(-model.system.mesh.nodes[:, 1], 0, None)
+    load = reference.pressure_load(twin.whole, model.system.mesh, 2e6 * depth / 14)
+    assert difference(model.pressure(model.spec)[twin.column], load) < ASSEMBLY
+
+
+@pytest.mark.parametrize("quadrature", ["nodal", "one-point"])
+@pytest.mark.parametrize("lumped", [False, True])
+def test_matrices_of_an_inclined_mesh_of_one_s_own_agree(block_mesh, quadrature, lumped):
+    """Turned by 0.4 rad, sheared, 0.3 thick, with a held component, tied nodes and a tied node whose master is held."""
+    turn = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]]) @ np.array([[1.0, 0.0], [0.2, 1.3]])
+    mesh = replace(block_mesh, nodes=block_mesh.nodes @ turn, pressure_edges=np.array([[8, 11], [11, 10]]))
+    held = Constraints.free(mesh).holding(np.array([0, 1]), (0, 1)).holding(np.array([2]), (1,))
+    held = held.tying(np.array([0, 9]), np.array([3, 11]), (0, 1)).tying(np.array([6]), np.array([8]), (0,))
+    soft, stiff = Material(3e4, 0.3, 2.0), Material(5e5, 0.0, 7.0)
+    joint = [JointMaterial(1e6, 4e5, 0.5)]
+    system = build_system(mesh, [soft, stiff], joint, held, quadrature=quadrature, lumped=lumped, thickness=0.3)
+    check_matrices(system, twin_of(system, [soft, stiff], held, quadrature, lumped, 0.3))
+
+
+# ---- models drawn at random ----
+
+
+def random_model(rng, largest_friction, damping_joints=False, beta=0.25, gamma=0.5) -> tuple[Model, list[Spec], list[np.ndarray]]:
+    """A model, four cases of it, and their base motions over 60 steps."""
+    sides = str(rng.choice(["tied", "shear", "roller", "fixed"]))
+    layers = [
+        {"bottom": bottom, "E": 10 ** rng.uniform(7.5, 10.5), "nu": rng.uniform(0.1, 0.4), "density": rng.uniform(1500, 3000)}
+        for bottom in np.sort(rng.uniform(0.5, 14, rng.integers(1, 5)))
+    ]
+    dt = 10 ** rng.uniform(-3, np.log10(0.02))
+    shared = {
+        "domain": Domain(width=rng.uniform(10, 18), depth=rng.uniform(10, 16)),
+        "box": Box(offset=rng.uniform(-1, 1), depth=rng.uniform(0.5, 4)),
+        "supports": Supports(sides=sides),
+        "damping": Damping(ratio=rng.uniform(0, 0.1), joints=damping_joints),
+        "time": Time(dt=dt, duration=60 * dt, newmark_beta=beta, newmark_gamma=gamma),
+        "mesh": COARSE.model_copy(update={"mass": str(rng.choice(["consistent", "lumped"]))}),
+        "joint": Joint(quadrature=str(rng.choice(["nodal", "one-point"]))),
+    }
+    pressures = [0.0, *rng.choice([-1.0, 1.0], 3) * 10 ** rng.uniform(4, 6.5, 3)]
+    frictions = [0.0, *rng.uniform(0, largest_friction, 3)]
+    specs = [
+        Spec(
+            **shared,
+            layer=tuple(Layer(**layer, friction=friction * rng.uniform(0.5, 1)) for layer in layers),
+            pressure=Pressure(p0=p0),
+            gravity=Gravity(self_weight=sides != "shear" and bool(rng.integers(2))),
+        )
+        for p0, friction in zip(pressures, frictions, strict=True)
+    ]
+    directions = [1.0, 0.0 if sides == "shear" else 1.0]
+    jumps = [rng.standard_normal((61, 2)) * 10 ** rng.uniform(-1, 1) * directions for _ in specs]
+    return build_model(specs[0]), specs, [np.cumsum(jump, axis=0) for jump in jumps]
+
+
+def lanes_of(model, specs, motions):
+    """Lanes, and the static loads as `equilibrium` takes them: (n_dof, LANES) of weight and of pressure."""
+    loads = [np.zeros((model.system.n_dof, LANES)) for _ in range(2)]
+    for lane, spec in enumerate(specs):
+        loads[0][:, lane], loads[1][:, lane] = model.weight(spec), model.pressure(spec)
+    laws = [model.system.joint_law(model.joint_materials(spec)) for spec in specs]
+    return Lanes.of(list((loads[0] + loads[1]).T[: len(specs)]), laws, motions), loads
+
+
+def moment(state, twin, lane):
+    motion, contact = state.motion, state.contact
+    u, v, a = (x[twin.column, lane] for x in (motion.u, motion.v, motion.a))
+    return reference.Moment(u, v, a, contact.slip[lane, twin.point], contact.state[lane, twin.point])
+
+
+def reference_step(model, twin, joints, start, standing, ground, parts=1, guess=None):
+    """A step of the reference, in equal parts with base acceleration linear between its ends `ground` (2, 2)."""
+    newmark, rayleigh = newmark_of(model.spec), model.rayleigh
+    for i in range(1, parts + 1):
+        start = reference.newmark_step(
+            twin.whole,
+            joints,
+            start,
+            standing - twin.whole.inertia @ (ground[0] + (ground[1] - ground[0]) * i / parts),
+            newmark.dt / parts,
+            rayleigh.alpha,
+            rayleigh.beta,
+            damped=rayleigh.joints,
+            newmark_beta=newmark.newmark_beta,
+            newmark_gamma=newmark.newmark_gamma,
+            guess=guess,
+        )
+    return start
+
+
+def step_error(model, expected, found):
+    """Largest error of u, slip, v and a, relative to the largest displacement; Newmark multiplies that of u by a1 and a0."""
+    newmark = newmark_of(model.spec)
+    a0 = 1 / (newmark.newmark_beta * newmark.dt**2)
+    a1 = newmark.newmark_gamma / (newmark.newmark_beta * newmark.dt)
+    factors = {"u": 1.0, "slip": 1.0, "v": a1, "a": a0}
+    worst = max(abs(getattr(expected, name) - getattr(found, name)).max() / factor for name, factor in factors.items())
+    return worst / max(abs(found.u).max(), 1e-300)
+
+
+def compare(model, twin, spec, where, before, after, standing, ground, halved):
+    """The Step of one lane."""
+    joints = reference.joints_of(twin.whole, model.joint_materials(spec))
+    for parts in (2, 4, 8, 16, 32, 64) if halved else (1,):
+        error = step_error(model, reference_step(model, twin, joints, before, standing, ground, parts), after)
+        if error <= STEP:
+            break
+    own = error
+    if error > STEP and not halved:
+        own = step_error(model, reference_step(model, twin, joints, before, standing, ground, guess=after.u), after)
+    return Step(where, error, own, set(after.state), halved)
+
+
+def steps_of(seed, instants=(1, 2, 5, 17, 38, 60), **options):
+    """March four random cases of a random model from their static state, comparing a step of each at several instants.
+
+    A case for which the engine finds no static state starts at rest, with its loads applied at once.
+    """
+    model, specs, motions = random_model(np.random.default_rng(seed), **options)
+    twin, (lanes, loads) = twin_of_model(model), lanes_of(model, specs, motions)
+    state, found = equilibrium(model.system, lanes, loads, model.frequencies[0])
+    for lane in np.flatnonzero(~found):
+        state.put(int(lane), State.at_rest(model.system))
+    stepper, ground = Stepper(model.system, newmark_of(model.spec), model.rayleigh), lanes.ground
+    stepper.start(state, lanes, ground[0])
+    result = []
+    for k in range(1, max(instants) + 1):
+        before = [moment(state, twin, lane) for lane in range(len(specs))]
+        report = stepper.step(state, lanes, ground[k - 1], ground[k])
+        for lane, spec in enumerate(specs):
+            assert not report.failed[lane], f"seed {seed}, case {lane}, step {k}: not solved even in parts of dt/64"
+            if k in instants:
+                standing, ends, after = (
+                    lanes.standing[twin.column, lane],
+                    ground[k - 1 : k + 1, :, lane],
+                    moment(state, twin, lane),
+                )
+                where = f"seed {seed}, case {lane}, step {k}"
+                result.append(compare(model, twin, spec, where, before[lane], after, standing, ends, bool(report.halved[lane])))
+    return result
+
+
+@pytest.fixture(scope="module")
+def ordinary_steps():
+    """Steps of random models: pressures of both signs and none, with and without weight, friction 0 to 1, dt 1 to 20 ms."""
+    return [step for seed in range(MODELS) for step in steps_of(seed, largest_friction=1.0)]
+
+
+# ---- one step from the same state ----
+
+
+def assert_agreement(steps, share_of_others):
+    """All steps agree, but for a share in which the engine has a solution other than the reference's: returned, all confirmed."""
+    others = [step for step in steps if step.error > STEP]
+    wrong = [step for step in others if not step.halved and step.own > STEP]
+    assert not wrong, "what the engine found is no solution"
+    assert len(others) <= share_of_others * len(steps), others
+    return others
+
+
+def test_a_step_from_the_same_state_agrees(ordinary_steps):
+    assert len(ordinary_steps) == MODELS * 4 * 6
+    # none differed when this was written; a draw of a non-unique step on another platform would be one or two
+    assert_agreement(ordinary_steps, 0.01)
+
+
+def test_the_compared_steps_have_points_in_every_state(ordinary_steps):
+    for wanted in ({0, 1, 2, 3}, {1, 2, 3}, {0, 2, 3}):
+        assert any(step.states == wanted for step in ordinary_steps), wanted
+
+
+def test_no_step_of_moderate_friction_is_halved(ordinary_steps):
+    """A solution of the step exists always (Brouwer), and up to a friction of 1 the engine finds it."""
+    assert not [step for step in ordinary_steps if step.halved]
+
+
+@pytest.mark.parametrize("seed", [100, 101, 102])
+def test_a_step_with_damped_joints_agrees(seed):
+    """C = alpha M + beta (K + joints), the joints as at the start of the step (D5)."""
+    assert_agreement(steps_of(seed, largest_friction=1.0, damping_joints=True), 0.0)
+
+
+@pytest.mark.parametrize("seed", [200, 201, 202])
+def test_a_step_of_a_dissipative_newmark_scheme_agrees(seed):
+    assert_agreement(steps_of(seed, largest_friction=1.0, beta=0.3025, gamma=0.6), 0.0)
+
+
+@pytest.mark.parametrize(("seed", "friction"), [(300, 4.0), (369, 4.0), (504, 12.0)])
+def test_with_large_friction_the_engine_finds_a_solution_if_not_the_only_one(seed, friction, record_property):
+    """There a step may have several solutions (one step of seed 369), or be solved in halves only (one of seed 504)."""
+    # 1 of 1920 steps of such models had another solution when this was written; 2 of these 24 would be a change of nature
+    others = assert_agreement(steps_of(seed, largest_friction=friction), 1 / 24)
+    record_property("other solutions than the reference's", len(others))
+
+
+# ---- static stage ----
+
+
+def check_static(model, specs, twin):
+    """The engine finds an equilibrium of every case, and it is the reference's. How many were compared is returned.
+
+    Where the box hangs on sliding points alone there are many, and the proximal term picks one: the reference then has another
+    one with another term, and only equilibrium is checked.
+    """
+    (lanes, loads), whole, column = lanes_of(model, specs, [np.zeros((2, 2))] * len(specs)), twin.whole, twin.column
+    state, found = equilibrium(model.system, lanes, loads, model.frequencies[0])
+    share, compared = (whole.area / model.system.points.area[twin.point])[:, None], 0
+    for lane, spec in enumerate(specs):
+        joints, parts = reference.joints_of(whole, model.joint_materials(spec)), [load[column, lane] for load in loads]
+        expected, other = (reference.static(whole, joints, parts, softness) for softness in (1e-3, 1e-2))
+        assert found[lane], f"p0 = {spec.pressure.p0:g}: the engine finds no equilibrium, the reference does"
+        own, force = moment(state, twin, lane), state.contact.force[lane].reshape(-1, 2)[twin.point] * share
+        excess = whole.K @ own.u + whole.B.T @ force.ravel() - sum(parts)
+        # D10 stops at 1e-10; rounding of the proximal steps may add as much
+        assert np.linalg.norm(excess) <= 2e-10 * np.linalg.norm(sum(parts))
+        assert abs(joints._replace(slip=own.slip).force(own.u) - force).max() <= STATIC_FORCE * abs(force).max()
+        largest = abs(expected.u).max()
+        if abs(expected.u - other.u).max() <= 0.1 * STATIC * largest:
+            compared += 1
+            assert abs(own.u - expected.u).max() <= STATIC * largest
+            assert abs(own.slip - expected.slip).max() <= STATIC * largest
+    return compared
+
+
+@pytest.mark.parametrize("seed", [400, 424, 464, 468, 516])
+def test_static_states_of_random_models_agree(seed):
+    """All but the first are hard: many points to close or to slide from rest at once, or a box that hardly anything holds."""
+    model, specs, _ = random_model(np.random.default_rng(seed), largest_friction=1.0)
+    assert check_static(model, specs, twin_of_model(model)) >= 1
+
+
+def test_static_states_of_the_reference_problem_agree(paper_model):
+    """Weight, then pressures that let the box lie, hang and be held on all sides, with friction up to 0.4 and up to 0.8."""
+    spec = paper_model.spec
+    specs = [
+        spec.model_copy(
+            update={
+                "pressure": Pressure(p0=p0),
+                "layer": tuple(layer.model_copy(update={"friction": friction}) for layer in spec.layer),
+            }
+        )
+        for p0, friction in ((2e4, 0.2), (2e6, 0.4), (4e6, 0.4), (-1e6, 0.8))
+    ]
+    assert check_static(paper_model, specs, twin_of_model(paper_model)) >= 1
+
+
+# ---- whole histories ----
+
+
+@pytest.mark.parametrize("sides", ["tied", "roller"])
+def test_a_whole_history_agrees_where_joints_slip_but_do_not_chatter(sides):
+    """Box pressed against the ground: weight, outward pressure, one second of a swelling motion, points that stick and slide."""
+    spec = Spec(
+        **{
+            **dict(SHIFTED),
+            "supports": Supports(sides=sides),
+            "pressure": Pressure(p0=-1e6),
+            "time": Time(dt=0.01, duration=1.0),
+            "output": Output(every=1),
+        }
+    )
+    model, t = build_model(spec), np.linspace(0, 1, 101)
+    motion = 4 * np.sin(np.pi * t)[:, None] * np.column_stack([np.sin(2 * np.pi * 3 * t), 0.4 * np.sin(2 * np.pi * 5 * t)])
+    twin = twin_of_model(model)
+    joints = reference.joints_of(twin.whole, model.joint_materials(spec))
+    loads = [model.weight(spec)[twin.column], model.pressure(spec)[twin.column]]
+    start = reference.static(twin.whole, joints, loads)
+    alpha, beta = model.rayleigh.alpha, model.rayleigh.beta
+    moments = reference.march(twin.whole, joints, start, sum(loads), motion, 0.01, alpha, beta)
+    states = [set(m.state) for m in moments]
+    assert any(states[i] & {reference.FORWARD, reference.BACKWARD} for i in range(1, 101))
+    assert len({tuple(m.state) for m in moments}) > 20
+    response = simulate_cases(model, [spec], [motion])
+    nodal = np.array([twin.whole.T @ m.u for m in moments]).reshape(len(moments), -1, 2)
+    for index, probe in enumerate(model.system.mesh.probes.values()):
+        expected = np.einsum("tnc,n->tc", nodal[:, probe.nodes], probe.node_weights)
+        assert difference(response.recorder.displacement(response.values)[0, :, index], expected) < HISTORY
