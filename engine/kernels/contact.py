@@ -9,10 +9,10 @@ along a path (`follow`).
 
 import numpy as np
 
-from .follow import MAX_PIECES, follow
+from .follow import follow
 from .jit import kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
-from .states import EQUATION_TOLERANCE, direct
+from .states import EQUATION_TOLERANCE, Kept, Points, direct
 
 UNIT_ROUNDOFF = 2.0**-53
 STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep the state they have
@@ -36,16 +36,16 @@ def _next_state(state, gap_n, normal, excess, forward):
 
 
 @kernel
-def _revise(g, lam, slip, k_s, mu, g_tol, lam_tol, state):
+def _revise(points, g, lam, g_tol, lam_tol, state):
     """Replace the states that do not hold; True where all did: no tension, no penetration, the Coulomb limit, slip forward."""
-    all_hold = True
+    mu, all_hold = points.mu, True
     for p in range(state.shape[0]):
         n, s = 2 * p, 2 * p + 1
         gap_n, normal, excess, forward = g[n] + g_tol, lam[n] - lam_tol, 0.0, 0.0
         if state[p] == STICK:
             excess, forward = abs(lam[s]) + mu[p] * lam[n] - lam_tol, lam[s]
         elif state[p] != OPEN and mu[p] > 0.0:
-            forward = slip_sign(state[p]) * (g[s] - lam[s] / k_s[p] - slip[p]) + g_tol
+            forward = slip_sign(state[p]) * (g[s] - lam[s] / points.k_s[p] - points.slip[p]) + g_tol
         following = _next_state(state[p], gap_n, normal, excess, forward)
         all_hold = all_hold and following == state[p]
         state[p] = np.int8(following)
@@ -77,8 +77,9 @@ def _rounding(G, g_free, lam, product):
 
 
 @kernel
-def _sweep(G, g_free, k_n, k_s, mu, slip, lam, proposal):
+def _sweep(points, g_free, lam, proposal):
     """One block Gauss-Seidel sweep over the points: lam and the proposed states are updated in place."""
+    G = points.G
     for p in range(proposal.shape[0]):
         n, s = 2 * p, 2 * p + 1
         r_n, r_s = g_free[n], g_free[s]
@@ -87,7 +88,8 @@ def _sweep(G, g_free, k_n, k_s, mu, slip, lam, proposal):
             r_s -= G[s, j] * lam[j]
         r_n += G[n, n] * lam[n] + G[n, s] * lam[s]
         r_s += G[s, n] * lam[n] + G[s, s] * lam[s]
-        code, lam[n], lam[s] = balance(G[n, n], G[n, s], G[s, s], r_n, r_s, slip[p], k_n[p], k_s[p], mu[p])
+        slip, k_n, k_s, mu = points.slip[p], points.k_n[p], points.k_s[p], points.mu[p]
+        code, lam[n], lam[s] = balance(G[n, n], G[n, s], G[s, s], r_n, r_s, slip, k_n, k_s, mu)
         proposal[p] = np.int8(code)
 
 
@@ -105,31 +107,30 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
 
     Returns (rounds, residual): how many direct solves it took, -1 where `max_rounds` did not do, and the relative residual.
     """
-    k_n, k_s, mu = law.k_n[lane], law.k_s[lane], law.mu[lane]
-    lu, pivot, factored, proposal = work.lu[lane], work.pivot[lane], work.factored[lane], work.proposal
-    g_tol = STATE_TOLERANCE * _largest(g_free)
+    points = Points(G, law.k_n[lane], law.k_s[lane], law.mu[lane], slip)
+    kept = Kept(work.lu[lane], work.pivot[lane], work.factored[lane], work.unknown, work.product)
+    proposal, g_tol = work.proposal, STATE_TOLERANCE * _largest(g_free)
     work.swept[:] = lam
     proposal[:] = state
     residual, sweeps = np.inf, FIRST_SWEEPS
     if not np.isfinite(np.sum(g_free)):
         return -1, np.nan
     for attempt in range(1, max_rounds + 1):
-        residual = direct(G, g_free, k_n, k_s, mu, slip, proposal, g, lam, lu, pivot, factored, work.unknown, work.product)
+        residual = direct(points, kept, g_free, proposal, g, lam)
         if not np.isfinite(residual):
             break
         work.tried[:] = proposal
-        held = _revise(g, lam, slip, k_s, mu, g_tol, STATE_TOLERANCE * _largest(lam), proposal)
-        if held and residual <= max(EQUATION_TOLERANCE, _rounding(G, g_free, lam, work.product)):
+        held = _revise(points, g, lam, g_tol, STATE_TOLERANCE * _largest(lam), proposal)
+        if held and (residual <= EQUATION_TOLERANCE or residual <= _rounding(G, g_free, lam, work.product)):
             state[:] = work.tried
             return attempt, residual
         if attempt == FOLLOW_AFTER:
-            pieces = MAX_PIECES * state.shape[0]
-            follow(G, g_free, k_n, k_s, mu, slip, proposal, g, lam, lu, pivot, factored, work, pieces)
+            follow(points, kept, work, g_free, proposal, g, lam)
         elif attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
             if attempt % (2 * NEWTON_ROUNDS) != 0:
-                _project(lam, mu, work.swept)
+                _project(lam, points.mu, work.swept)
             for _ in range(sweeps):
-                _sweep(G, g_free, k_n, k_s, mu, slip, work.swept, proposal)
+                _sweep(points, g_free, work.swept, proposal)
             sweeps *= 2
     return -1, residual
 

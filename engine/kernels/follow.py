@@ -16,16 +16,16 @@ MAX_PIECES = 40
 
 
 @kernel
-def _margin(p, to, state, g, lam, slip, k_s, mu):
+def _margin(points, p, to, state, g, lam):
     """How far point p is from the border between its state and the state `to`: linear within a piece, negative beyond it."""
     n, s = 2 * p, 2 * p + 1
     if state == OPEN:
         return g[n]
     if state == STICK:
-        return -mu[p] * lam[n] - slip_sign(to) * lam[s]
+        return -points.mu[p] * lam[n] - slip_sign(to) * lam[s]
     if to == OPEN:
         return -lam[n]
-    return slip_sign(state) * (g[s] - lam[s] / k_s[p] - slip[p])
+    return slip_sign(state) * (g[s] - lam[s] / points.k_s[p] - points.slip[p])
 
 
 @kernel
@@ -39,7 +39,7 @@ def _borders(state, mu):
 
 
 @kernel
-def follow(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, work, max_pieces):
+def follow(points, kept, work, g_free, state, g, lam):
     """Follow the solution from all points open, g_free pushed apart, to g_free itself, a border of states at a time.
 
     The law is piecewise linear, so the path is a chain of straight pieces, each a direct solve at both ends; it cannot return
@@ -47,31 +47,29 @@ def follow(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, wo
     """
     size = 0.0
     for p in range(state.shape[0]):
-        size = max(size, abs(g_free[2 * p]) + abs(g_free[2 * p + 1]) + abs(slip[p]))
+        size = max(size, abs(g_free[2 * p]) + abs(g_free[2 * p + 1]) + abs(points.slip[p]))
     work.far[:] = g_free
     for p in range(state.shape[0]):
-        work.far[2 * p] += 3.0 * (1.0 + mu[p]) * size
+        work.far[2 * p] += 3.0 * (1.0 + points.mu[p]) * size
     state[:] = OPEN
     moved, came_from, forwards = -1, OPEN, True
-    for _ in range(max_pieces):
-        solved = direct(
-            G, work.far, k_n, k_s, mu, slip, state, work.far_gap, work.far_force, lu, pivot, factored, work.unknown, work.product
-        )
-        solved += direct(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, work.unknown, work.product)
+    for _ in range(MAX_PIECES * state.shape[0]):
+        solved = direct(points, kept, work.far, state, work.far_gap, work.far_force)
+        solved += direct(points, kept, g_free, state, g, lam)
         if not np.isfinite(solved):
             return False
         if moved >= 0:
             back = SLIP_FORWARD if state[moved] == OPEN else came_from
-            forwards = _margin(moved, back, state[moved], g, lam, slip, k_s, mu) > _margin(
-                moved, back, state[moved], work.far_gap, work.far_force, slip, k_s, mu
+            forwards = _margin(points, moved, back, state[moved], g, lam) > _margin(
+                points, moved, back, state[moved], work.far_gap, work.far_force
             )
         best, point, following = (1.0 if forwards else -np.inf), -1, OPEN
         for p in range(state.shape[0]):
-            for to in _borders(state[p], mu[p]):
+            for to in _borders(state[p], points.mu[p]):
                 if to < 0 or (p == moved and (to == came_from or state[p] == OPEN)):
                     continue
-                far = _margin(p, to, state[p], work.far_gap, work.far_force, slip, k_s, mu)
-                near = _margin(p, to, state[p], g, lam, slip, k_s, mu)
+                far = _margin(points, p, to, state[p], work.far_gap, work.far_force)
+                near = _margin(points, p, to, state[p], g, lam)
                 slope = near - far
                 if slope == 0.0 or (slope < 0.0) != forwards:
                     continue
@@ -82,7 +80,7 @@ def follow(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, wo
             return forwards
         s = 2 * point + 1
         if state[point] == OPEN:
-            above = work.far_gap[s] + best * (g[s] - work.far_gap[s]) > slip[point]
+            above = work.far_gap[s] + best * (g[s] - work.far_gap[s]) > points.slip[point]
             following = SLIP_FORWARD if above else SLIP_BACKWARD
         moved, came_from = point, state[point]
         state[point] = np.int8(following)

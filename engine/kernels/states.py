@@ -24,6 +24,26 @@ class Law(NamedTuple):
     mu: np.ndarray
 
 
+class Points(NamedTuple):
+    """The joint points of one lane: flexibility G (m, m), m = 2 n_point; area times stiffness, friction, slip (n_point,)."""
+
+    G: np.ndarray
+    k_n: np.ndarray
+    k_s: np.ndarray
+    mu: np.ndarray
+    slip: np.ndarray
+
+
+class Kept(NamedTuple):
+    """The factor kept of one lane with the states it belongs to, and scratch: unknowns and G lambda (m,)."""
+
+    lu: np.ndarray
+    pivot: np.ndarray
+    factored: np.ndarray
+    unknown: np.ndarray
+    product: np.ndarray
+
+
 class Workspace(NamedTuple):
     """Scratch of the solve, and the factor kept for each lane with the states it belongs to."""
 
@@ -63,9 +83,9 @@ def workspace(n_point: int, lanes: int) -> Workspace:
 
 
 @kernel
-def _assemble(G, k_n, k_s, mu, state, A):
+def _assemble(points, state, A):
     """Fill A with the equations of the closed points in these states; the number of unknowns is returned."""
-    row = 0
+    G, row = points.G, 0
     for p in range(state.shape[0]):
         for direction in range(1 if state[p] != STICK else 2):
             if state[p] == OPEN:
@@ -79,9 +99,9 @@ def _assemble(G, k_n, k_s, mu, state, A):
                     A[row, column + 1] = G[i, 2 * q + 1]
                     column += 2
                 else:
-                    A[row, column] = G[i, 2 * q] - slip_sign(state[q]) * mu[q] * G[i, 2 * q + 1]
+                    A[row, column] = G[i, 2 * q] - slip_sign(state[q]) * points.mu[q] * G[i, 2 * q + 1]
                     column += 1
-            A[row, row] += 1.0 / (k_n[p] if direction == 0 else k_s[p])
+            A[row, row] += 1.0 / (points.k_n[p] if direction == 0 else points.k_s[p])
             row += 1
     return row
 
@@ -103,7 +123,7 @@ def _residual(G, g_free, g, lam, product):
 
 
 @kernel
-def _scatter(x, k_n, k_s, mu, slip, state, g, lam, add):
+def _scatter(points, x, state, g, lam, add):
     """Forces of the unknowns x into lam, and the gaps they imply into g; `add` corrects instead of setting them."""
     k = 0
     for p in range(state.shape[0]):
@@ -114,13 +134,13 @@ def _scatter(x, k_n, k_s, mu, slip, state, g, lam, add):
             lam[n] = lam[s] = 0.0
             continue
         lam[n] = old_n + x[k]
-        g[n] = lam[n] / k_n[p]
+        g[n] = lam[n] / points.k_n[p]
         if state[p] == STICK:
             lam[s] = old_s + x[k + 1]
-            g[s] = slip[p] + lam[s] / k_s[p]
+            g[s] = points.slip[p] + lam[s] / points.k_s[p]
             k += 2
         else:
-            lam[s] = -slip_sign(state[p]) * mu[p] * lam[n]
+            lam[s] = -slip_sign(state[p]) * points.mu[p] * lam[n]
             k += 1
 
 
@@ -149,32 +169,40 @@ def _rows(state, source, slip, slip_factor, x):
 
 
 @kernel
-def direct(G, g_free, k_n, k_s, mu, slip, state, g, lam, lu, pivot, factored, unknown, product):
-    """Solve for given states. The factor is reused while they last. Returns the relative residual, infinity where singular."""
-    n_point = state.shape[0]
-    same, size = True, 0
-    for p in range(n_point):
-        same = same and factored[p] == state[p]
+def _forces(points, kept, source, slip_factor, g_free, state, g, lam):
+    """Solve for the forces that `source` calls for, then the gaps; the relative residual. A `slip_factor` of 0 corrects lam."""
+    _rows(state, source, points.slip, slip_factor, kept.unknown)
+    solve(kept.lu, _size(state), kept.pivot, kept.unknown)
+    _scatter(points, kept.unknown, state, g, lam, slip_factor == 0.0)
+    _residual(points.G, g_free, g, lam, kept.product)
+    _free_gaps(g_free, kept.product, state, g)
+    return _residual(points.G, g_free, g, lam, kept.product)
+
+
+@kernel
+def _size(state):
+    """Number of unknowns: two of a sticking point, one of a sliding one."""
+    size = 0
+    for p in range(state.shape[0]):
         size += 0 if state[p] == OPEN else (2 if state[p] == STICK else 1)
+    return size
+
+
+@kernel
+def direct(points, kept, g_free, state, g, lam):
+    """Solve for given states. The factor is reused while they last. Returns the relative residual, infinity where singular."""
+    same = True
+    for p in range(state.shape[0]):
+        same = same and kept.factored[p] == state[p]
     if not same:
-        _assemble(G, k_n, k_s, mu, state, lu)
-        factored[:] = state
-        if not factorise(lu, size, pivot):
-            factored[:] = -1
+        size = _assemble(points, state, kept.lu)
+        kept.factored[:] = state
+        if not factorise(kept.lu, size, kept.pivot):
+            kept.factored[:] = -1
             return np.inf
-    _rows(state, g_free, slip, 1.0, unknown)
-    solve(lu, size, pivot, unknown)
-    _scatter(unknown, k_n, k_s, mu, slip, state, g, lam, False)
-    _residual(G, g_free, g, lam, product)
-    _free_gaps(g_free, product, state, g)
-    residual = _residual(G, g_free, g, lam, product)
+    residual = _forces(points, kept, g_free, 1.0, g_free, state, g, lam)
     if residual > 0.1 * EQUATION_TOLERANCE:  # one step of iterative refinement
         for i in range(g.shape[0]):
-            product[i] = g_free[i] - product[i] - g[i]
-        _rows(state, product, slip, 0.0, unknown)
-        solve(lu, size, pivot, unknown)
-        _scatter(unknown, k_n, k_s, mu, slip, state, g, lam, True)
-        _residual(G, g_free, g, lam, product)
-        _free_gaps(g_free, product, state, g)
-        residual = _residual(G, g_free, g, lam, product)
+            kept.product[i] = g_free[i] - kept.product[i] - g[i]
+        residual = _forces(points, kept, kept.product, 0.0, g_free, state, g, lam)
     return residual
