@@ -288,7 +288,7 @@ def test_a_folder_is_no_study(tmp_path):
 def test_a_missing_file_is_told_with_the_shipped_names(name):
     (line,) = mistakes_of(name)
     assert line.startswith(f'"{name[:50]}')
-    assert "there is no such file, nor a shipped study of that name (p0, paper" in line
+    assert "there is no such file, nor a shipped study of that name (damping, p0, paper, scale" in line
 
 
 # shipped studies -----------------------------------------------------------------------------------------------------------
@@ -335,3 +335,13 @@ def test_studies_in_the_readme_are_valid():
     assert blocks
     for block in blocks:
         assert make_study(tomllib.loads(block)).cases
+
+
+def test_damping_and_scale_sweep_nine_values_each():
+    damping, scale = load_study("damping"), load_study("scale")
+    ratios = [spec.damping.ratio for spec in damping.cases]
+    assert len(ratios) == 9
+    assert (ratios[0], ratios[-1]) == (0.01, 0.20)
+    factors = [spec.motion.scale for spec in scale.cases]
+    np.testing.assert_allclose(factors, 0.25 * 2.0 ** (np.arange(9) / 2), rtol=1e-14)  # rounding of the powers
+    assert (len(damping.batches), len(scale.batches)) == (9, 1)  # the damping is in the factor, the scale in the load
