@@ -18,6 +18,7 @@ from engine import PRESETS
 
 from .advice import advise
 from .dataset import study_hash
+from .domain_size import convergence_sentence, size_axis
 from .fields import catalogue
 from .messages import StudyError
 from .plan import Study, load_study, shipped_studies
@@ -184,6 +185,8 @@ def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
     out.print(f"\n[bold]{study.title}[/bold]")
     for sentence in sentences(ds):
         out.print(sentence, markup=False)
+    if size_axis(ds):
+        out.print(convergence_sentence(ds), markup=False)
     for line in lost[:20]:
         out.print(f"failed: {line}", markup=False)
     if len(lost) > 20:

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from engine import Status
 
+from .domain_size import SOURCE_TOLERANCE, size_axis
 from .table import axes_of, cases_of, in_words
 
 WIDTH = 180 / 25.4
@@ -57,6 +58,8 @@ def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
         }
         if len(axes) == 1 and done[axes[0]].dtype.kind in "fi" and done.sizes["case"] > 2:
             drawings["peaks"] = lambda: peaks_figure(done, axes[0])
+        if size_axis(ds):
+            drawings["convergence"] = lambda: convergence_figure(ds, size_axis(ds))
     files = []
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         for name, draw in drawings.items():
@@ -205,6 +208,26 @@ def peaks_figure(cases: xr.Dataset, axis: str) -> Figure:
         ax.set(ylabel=label, xlabel=f"{_symbol(axis)} [{prefix}{unit}]" if unit != "1" else _symbol(axis))
         if len(curves) > 1:
             ax.legend()
+    return fig
+
+
+def convergence_figure(ds: xr.Dataset, axis: str) -> Figure:
+    """Change from size to size of every measure, and the error that remains where it can be certified."""
+    fig = Figure(figsize=(WIDTH, 2.9))
+    panels = fig.subplots(1, 2, sharex=True, sharey=True)
+    styles = (("black", "-", "o"), ("#d95f02", "--", "s"), ("#1f78b4", "-.", "^"), ("#666666", ":", "D"), ("#7570b3", "-", "v"))
+    for ax, name, label in zip(
+        panels, ("epsilon", "remaining_error"), ("change from the size before", "remaining error"), strict=True
+    ):
+        for measure, (colour, dash, marker) in zip(ds["measure"].values, styles, strict=True):
+            values = 100 * ds[name].sel(measure=measure)
+            ax.plot(ds[axis], values, color=colour, ls=dash, marker=marker, markersize=3.5, label=str(measure))
+        ax.set(yscale="log", xlabel=f"{_symbol(axis)} [m]", title=label)
+    panels[0].set_ylabel("[%]")
+    panels[0].axhline(100 * SOURCE_TOLERANCE, color="0.6", lw=0.7, zorder=0)
+    note = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
+    panels[0].annotate("the source's 2.16 %", (0.99, 100 * SOURCE_TOLERANCE), **note)  # type: ignore[arg-type]
+    fig.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return fig
 
 

@@ -16,6 +16,7 @@ import xarray as xr
 from engine import MeshError, Model, Spec, Status, build_model, free_field, simulate_cases
 
 from .dataset import build_dataset, case_arrays
+from .domain_size import with_convergence
 from .messages import StudyError
 from .plan import Study, load_study
 
@@ -66,7 +67,7 @@ def run_study(study: Study, workers: int | None = None, progress: Progress | Non
         found.append(_emptied(whole, len(batch.cases), outcome) if isinstance(outcome, Lost) else outcome)
         for lane, case in enumerate(batch.cases):
             owner[case] = b, lane
-    return build_dataset(study, [outcome.model for outcome in found], [outcome.arrays for outcome in found], owner)
+    return with_convergence(build_dataset(study, [each.model for each in found], [each.arrays for each in found], owner))
 
 
 def _emptied(whole: Outcome, n_case: int, lost: Lost) -> Outcome:

@@ -244,7 +244,10 @@ def test_long_messages_are_not_broken(folder):
 
 
 def test_a_missing_study_is_told_with_the_shipped_names(folder):
-    refused(call("run", "nix"), '"nix": there is no such file, nor a shipped study of that name (damping, p0, paper, scale)')
+    refused(
+        call("run", "nix"),
+        '"nix": there is no such file, nor a shipped study of that name (damping, domain_size, p0, paper, scale)',
+    )
 
 
 def test_a_study_must_be_named(folder):

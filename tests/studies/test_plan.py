@@ -288,7 +288,7 @@ def test_a_folder_is_no_study(tmp_path):
 def test_a_missing_file_is_told_with_the_shipped_names(name):
     (line,) = mistakes_of(name)
     assert line.startswith(f'"{name[:50]}')
-    assert "there is no such file, nor a shipped study of that name (damping, p0, paper, scale" in line
+    assert "there is no such file, nor a shipped study of that name (damping, domain_size, p0, paper, scale" in line
 
 
 # shipped studies -----------------------------------------------------------------------------------------------------------
