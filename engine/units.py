@@ -32,6 +32,8 @@ def _factor(written: str, wanted: str) -> float:
         factor = float(_registry().Quantity(1.0, unit).to(wanted).magnitude)
         angular = wanted == "Hz" and "radian" in str(_registry().get_base_units(unit)[1])
     except pint.DimensionalityError:
+        if wanted == "dimensionless":
+            raise ValueError(f"must be a number without a unit (dimensionless), not one in {written}") from None
         raise ValueError(f"must be a quantity in {wanted} or a unit like it, {written} is not") from None
     except Exception:  # pint passes on whatever its parser met
         raise ValueError(f"unit {written!r} is not known; must be a unit like {wanted}") from None

@@ -11,8 +11,8 @@ from .plan import Study
 from .run import uplift_over_weight
 from .table import in_words
 
-SECONDS_PER_CASE_STEP_AND_DOF = 1.2e-7
-"""Measured on one core by `coralquake run p0`; for the estimate that `check` prints."""
+SECONDS_PER_STEP_AND_DOF = 1.2e-6
+"""Of a batch, whether it holds one case or nine: measured by `coralquake run p0` and `damping`; for the estimate of `check`."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,14 @@ def bending_bound(spec: Spec) -> float:
 def _facts(study: Study, model: Model, workers: int) -> list[tuple[str, str]]:
     mesh = model.system.mesh
     steps = sum(round(spec.time.duration / spec.time.dt) for spec in study.cases)
-    seconds = steps * model.system.n_dof * SECONDS_PER_CASE_STEP_AND_DOF / min(workers, len(study.batches))
+    marched = sum(
+        max(round(study.cases[i].time.duration / study.cases[i].time.dt) for i in batch.cases) for batch in study.batches
+    )
+    seconds = marched * model.system.n_dof * SECONDS_PER_STEP_AND_DOF / min(workers, len(study.batches))
     structure = int(mesh.structure.sum())
+    batches = "1 batch" if len(study.batches) == 1 else f"{len(study.batches)} batches"
     return [
-        ("cases", f"{len(study.cases)} in {len(study.batches)} batches, {steps:,} case-steps, about {max(seconds, 1):.0f} s"),
+        ("cases", f"{len(study.cases)} in {batches}, {steps:,} case-steps, about {max(seconds, 1):.0f} s"),
         ("axes", ", ".join(f"{axis.name} ({len(axis.values)})" for axis in study.axes) or "none"),
         ("mesh", f"{structure} structure + {len(mesh.joints)} joint + {len(mesh.triangles) - structure} ground elements"),
         ("unknowns", f"{model.system.n_dof} degrees of freedom, {len(model.system.points)} joint points"),
