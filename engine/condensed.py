@@ -41,6 +41,12 @@ def solve(factor: Factor, x: Floats) -> Floats:
     return x
 
 
+def take_solution(into: Contact, source: Contact, lanes: slice | np.ndarray) -> None:
+    """Copy what a joint solve finds (gap, force, state) from one contact state to another, for the chosen lanes."""
+    for mine, theirs in ((into.gap, source.gap), (into.force, source.force), (into.state, source.state)):
+        mine[lanes] = theirs[lanes]
+
+
 @dataclass(frozen=True)
 class JointDamping:
     """Dashpots of one step (D5), lane first: force = slope g + offset; T = (I + G slope)⁻¹ and G with them eliminated, T G."""
@@ -100,16 +106,13 @@ class Condensed:
         if damping is not None:
             for lane in range(n_lane):
                 self._gap[:, lane] = damping.T[lane] @ (self._gap[:, lane] - self.G[0] @ damping.offset[lane])
-        for name in ("gap", "force", "state"):
-            getattr(found, name)[:] = getattr(before, name)
+        take_solution(found, before, slice(None))
         G = self.G if damping is None else damping.G
         solve_joints(
             G, self._gap, law, n_lane, MAX_ROUNDS, self._work, before.slip, found, self.rounds, self.residual, self.source
         )
         failed = self.rounds[:n_lane] < 0
-        for lane in np.flatnonzero(failed).tolist():
-            for name in ("gap", "force", "state"):
-                getattr(found, name)[lane] = getattr(before, name)[lane]
+        take_solution(found, before, np.flatnonzero(failed))
         self._apply(rhs, found.force if damping is None else found.force + damping.slope * found.gap + damping.offset)
         return failed
 
@@ -124,6 +127,6 @@ class Condensed:
         self.u[start:] += self._tail[start:]
         backward(self.factor, 0, self.u)
 
-    def forget(self, lane: int) -> None:
-        """Drop the joint factor kept for a lane; its flexibility has changed."""
-        self._work.factored[lane] = -1
+    def forget(self, lanes: int | slice) -> None:
+        """Drop the joint factors kept for these lanes; their flexibility or their joints have changed."""
+        self._work.factored[lanes] = -1

@@ -73,6 +73,7 @@ class Stepper:
         self._rhs: Floats = np.zeros((system.n_dof, LANES))
         self._Mu: Floats = np.zeros((system.n_dof, LANES))
         self._found: Contact = State.at_rest(system).contact
+        self._none: Floats = np.zeros_like(self._found.gap)  # dashpots where damping leaves the joints out
         self._damping = _JointDampingCache(self) if rayleigh.joints and len(system.points) else None
         self._halved: dict[int, Stepper] = {}
 
@@ -85,8 +86,7 @@ class Stepper:
 
     def start(self, state: State, lanes: Lanes, ground: Floats) -> None:
         """Complete a static state: images under M and K, and the first acceleration from (D4); velocities are zero."""
-        for lane in range(LANES):
-            self.condensed.forget(lane)  # its factor may be that of other joints
+        self.condensed.forget(slice(None))  # the factors may be those of other joints
         motion, contact = state.motion, state.contact
         K = rows(self.system.K)
         product(self._M, motion.u, motion.Mu)
@@ -121,8 +121,7 @@ class Stepper:
         product(self._M, self.condensed.u, self._Mu)
         mean = 0.5 * (ground + ground_end)
         commit(self.rates, loads, mean, self._rhs, self.condensed.u, self._Mu, state.motion, state.energy)
-        zero = np.zeros_like(state.contact.gap)
-        slope, offset = (self._damping.last.slope, self._damping.last.offset) if self._damping else (zero, zero)
+        slope, offset = (self._damping.last.slope, self._damping.last.offset) if self._damping else (self._none, self._none)
         commit_joints(lanes.law, slope, offset, lanes.n_lane, self._found, state.contact, state.energy)
 
     def _in_halves(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from .assembly import System, rows
-from .condensed import Condensed
+from .condensed import Condensed, take_solution
 from .kernels.jit import LANES
 from .kernels.march import commit_joints
 from .kernels.sparse import product
@@ -76,7 +76,6 @@ class _Proximal:
         failed[: lanes.n_lane] = self._condensed.solve(rhs, lanes.law, lanes.n_lane, start, self._found)
         step = self._condensed.u - trial.motion.u
         trial.motion.u[:, moving] = self._condensed.u[:, moving]
-        for name in ("gap", "force", "state"):
-            getattr(trial.contact, name)[moving] = getattr(self._found, name)[moving]
+        take_solution(trial.contact, self._found, moving)
         product(self._M, step, self._inertia)
         return self.eta * np.linalg.norm(self._inertia, axis=0), failed

@@ -58,13 +58,6 @@ def _refuse(lines: list[str]) -> typer.Exit:
     return typer.Exit(WRONG_INPUT)
 
 
-def _load(source: str) -> Study:
-    try:
-        return load_study(source)
-    except StudyError as error:
-        raise _refuse(error.mistakes) from None
-
-
 def _open(path: Path) -> xr.Dataset:
     if not path.is_file():
         raise _refuse([f"{path}: there is no such results file; results are written by `coralquake run`"])
@@ -205,7 +198,7 @@ def _summary(rows: list[tuple[str, ...]]) -> Table:
 @app.command()
 def check(study: StudyName, workers: Workers = None) -> None:
     """Validate a study and say what would run, its size and warnings; run nothing."""
-    loaded = _load(study)
+    (loaded,) = _load_all([study])
     advice = advise(loaded, workers or os.cpu_count() or 1)
     out.print(f"[bold]{loaded.title}[/bold]")
     width = max(len(name) for name, _ in advice.facts)
