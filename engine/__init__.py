@@ -6,6 +6,7 @@ lanes. All arrays are in SI, or in any consistent units where a mesh is built fr
 
 from .assembly import Constraints, JointMaterial, JointPoints, Material, System, build_system
 from .boxmesh import BoxMesh, box_mesh, column_mesh
+from .carry import carried_down
 from .column import FreeField, free_field
 from .kernels.jit import LANES
 from .mesh import Mesh, MeshError, Probe
@@ -49,6 +50,7 @@ __all__ = [
     "box_mesh",
     "build_model",
     "build_system",
+    "carried_down",
     "column_mesh",
     "equilibrium",
     "free_field",

@@ -11,7 +11,7 @@ from .mesh import Floats
 from .modes import natural_frequencies, rayleigh_coefficients
 from .newmark import Newmark, Rayleigh, Stepper
 from .simulate import Response, simulate
-from .spec import Spec
+from .spec import Domain, Spec
 from .state import Lanes
 
 N_FREQUENCIES = 6
@@ -62,6 +62,14 @@ def materials(spec: Spec) -> list[Material]:
 
 def build_model(spec: Spec) -> Model:
     """Mesh, assemble, find the frequencies and the damping that follows from them (D5)."""
+    groups, system = _meshed_system(spec)
+    frequencies = natural_frequencies(system, N_FREQUENCIES)
+    alpha, beta = rayleigh_coefficients(spec.damping.ratio, *_damped_frequencies(spec, frequencies))
+    return Model(spec, system, groups, frequencies, Rayleigh(alpha, beta, spec.damping.joints))
+
+
+def _meshed_system(spec: Spec) -> tuple[tuple[tuple[int, float], ...], System]:
+    """The system of a spec, and the groups of its joints."""
     meshed = box_mesh(spec)
     system = build_system(
         meshed.mesh,
@@ -71,10 +79,18 @@ def build_model(spec: Spec) -> Model:
         quadrature=spec.joint.quadrature,
         lumped=spec.mesh.mass == "lumped",
     )
-    frequencies = natural_frequencies(system, N_FREQUENCIES)
-    pair = spec.damping.frequencies or (frequencies[0], frequencies[1])
-    alpha, beta = rayleigh_coefficients(spec.damping.ratio, *pair)
-    return Model(spec, system, meshed.joint_groups, frequencies, Rayleigh(alpha, beta, spec.damping.joints))
+    return meshed.joint_groups, system
+
+
+def _damped_frequencies(spec: Spec, own: Floats) -> tuple[float, float]:
+    """The two frequencies [Hz] of the damping ratio: those named, or the first two of the reference domain or of the case."""
+    damping = spec.damping
+    if damping.frequencies is not None:
+        return damping.frequencies
+    reference = Domain(width=damping.reference_width or spec.domain.width, depth=damping.reference_depth or spec.domain.depth)
+    if reference != spec.domain:
+        own = natural_frequencies(_meshed_system(spec.model_copy(update={"domain": reference}))[1], 2)
+    return float(own[0]), float(own[1])
 
 
 def newmark_of(spec: Spec) -> Newmark:

@@ -9,9 +9,9 @@ from itertools import pairwise
 from math import log
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from .units import Quantity
+from .units import Quantity, in_si
 
 STANDARD_GRAVITY = 9.81
 """[m/s²], turns a unit weight into a density."""
@@ -104,14 +104,60 @@ class Pressure(Section):
     reference_height: Quantity("m", "depth at which the pressure is p0", gt=0) = 14.0
 
 
-class Motion(Section):
-    """Rigid-base motion. A record is a file beside the study or one of those shipped; "none" leaves the direction out."""
+GENERATED = ("synthetic", "ricker")
+"""Names that stand for a generated motion where a record's file name could stand."""
 
-    record: Annotated[str, Field(description="horizontal record (PEER AT2)")] = "ridgecrest-2019-clc-360.AT2"
+
+class Motion(Section):
+    """Rigid-base motion. A record is a file beside the study or one of those shipped, or a generated motion (see [synthetic] and
+    [ricker]); "none" leaves the direction out."""
+
+    record: Annotated[str, Field(description="horizontal record (PEER AT2, K-NET, text or CSV), synthetic, ricker or none")] = (
+        "ridgecrest-2019-clc-360.AT2"
+    )
     peak: Quantity("m/s**2", "horizontal peak to scale to; left out: as recorded", gt=0) | None = 1.7085
-    vertical_record: Annotated[str, Field(description="vertical record (PEER AT2)")] = "none"
+    vertical_record: Annotated[str, Field(description="vertical record, in the same ways")] = "none"
     vertical_peak: Quantity("m/s**2", "vertical peak to scale to; left out: scaled as the horizontal", gt=0) | None = None
     scale: Quantity("1", "factor on both directions") = 1.0
+    record_dt: Quantity("s", "time step of a record of one column of text", gt=0) | None = None
+    record_unit: Annotated[str | None, Field(description='unit of a text record\'s values, as in "cm/s**2"')] = None
+    reference_depth: (
+        Quantity(
+            "m",
+            "depth at which the record is the free field's motion; a deeper base gets what causes it; left out: at the base",
+            gt=0,
+        )
+        | None
+    ) = None
+
+    @field_validator("record_unit")
+    @classmethod
+    def _is_acceleration(cls, unit: str | None) -> str | None:
+        if unit is not None:
+            in_si(f"1 {unit}", "m/s**2", unit_required=True)
+        return unit
+
+
+class Synthetic(Section):
+    """A generated accelerogram: white noise through the filter of Clough and Penzien, in an envelope that rises quadratically,
+    stays and decays exponentially (Amin and Ang 1968). The defaults are firm ground's (Der Kiureghian and Neuenhofer 1992)."""
+
+    seed: Annotated[int, Field(strict=True, ge=0, le=2**63 - 1, description="seed of the noise")] = 1
+    step: Quantity("s", "time step of the noise", gt=0) = 0.01
+    ground_frequency: Quantity("Hz", "frequency of the ground's filter", gt=0) = 2.4
+    ground_damping: Quantity("1", "damping ratio of the ground's filter", gt=0, le=1) = 0.6
+    low_frequency: Quantity("Hz", "frequency below which the noise is filtered out", gt=0) = 0.24
+    low_damping: Quantity("1", "damping ratio of that filter", gt=0, le=1) = 0.6
+    rise: Quantity("s", "how long the envelope rises", gt=0) = 2.0
+    plateau: Quantity("s", "how long it stays", ge=0) = 8.0
+    decay: Quantity("s", "in what time it then falls to 1/e", gt=0) = 3.0
+
+
+class Ricker(Section):
+    """A Ricker wavelet, (1 - 2 x^2) exp(-x^2) with x = pi f (t - t0)."""
+
+    frequency: Quantity("Hz", "frequency of its largest amplitude", gt=0) = 5.0
+    arrival: Quantity("s", "moment of its peak", gt=0) = 1.0
 
 
 class Damping(Section):
@@ -122,6 +168,8 @@ class Damping(Section):
         tuple[Quantity("Hz", "frequency", gt=0), Quantity("Hz", "frequency", gt=0)] | None,
         Field(description="the two frequencies; left out: the first two of the bonded system"),
     ] = None
+    reference_width: Quantity("m", "width of the domain whose frequencies they are; left out: the case's own", gt=0) | None = None
+    reference_depth: Quantity("m", "depth of that domain; left out: the case's own", gt=0) | None = None
     joints: Annotated[
         bool, Field(strict=True, description="whether beta acts on the joints' stiffness too, as in the source")
     ] = False
@@ -206,6 +254,8 @@ class Spec(Section):
     layer: Annotated[tuple[Layer, ...], Field(min_length=1)] = _coral_layers()
     pressure: Pressure = Pressure()
     motion: Motion = Motion()
+    synthetic: Synthetic = Synthetic()
+    ricker: Ricker = Ricker()
     damping: Damping = Damping()
     time: Time = Time()
     mesh: MeshOptions = MeshOptions()
@@ -240,6 +290,12 @@ def _conflicts(spec: Spec) -> Any:
     if abs(box.offset) + box.width / 2 >= domain.width / 2:
         field, value = ("box.offset", box.offset) if box.width < domain.width else ("box.width", box.width)
         yield f"{field} = {value:g} m: box must lie inside domain.width = {domain.width:g} m"
+    if (depth := spec.damping.reference_depth) is not None and box.depth + box.height >= depth:
+        yield f"damping.reference_depth = {depth:g} m: box's floor at {box.depth + box.height:g} m must lie above it"
+    if (width := spec.damping.reference_width) is not None and abs(box.offset) + box.width / 2 >= width / 2:
+        yield f"damping.reference_width = {width:g} m: must be wide enough for the box"
+    if (depth := spec.motion.reference_depth) is not None and depth > domain.depth:
+        yield f"motion.reference_depth = {depth:g} m: must not lie below the base, domain.depth = {domain.depth:g} m"
     if 2 * box.wall >= min(box.width, box.height):
         yield f"box.wall = {box.wall:g} m: two walls must leave room inside {box.width:g} m x {box.height:g} m"
     bottoms = [layer.bottom for layer in spec.layer]

@@ -18,7 +18,7 @@ from engine import PRESETS
 
 from .advice import advise
 from .dataset import study_hash
-from .domain_size import convergence_sentence, size_axis
+from .domain_size import convergence_sentences, is_domain_size, source_sentence
 from .fields import catalogue
 from .messages import StudyError
 from .plan import Study, load_study, shipped_studies
@@ -178,8 +178,9 @@ def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
     out.print(f"\n[bold]{study.title}[/bold]")
     for sentence in sentences(ds):
         out.print(sentence, markup=False)
-    if size_axis(ds):
-        out.print(convergence_sentence(ds), markup=False)
+    if is_domain_size(ds):
+        for sentence in [*convergence_sentences(ds), source_sentence(ds)]:
+            out.print(sentence, markup=False)
     for line in lost[:20]:
         out.print(f"failed: {line}", markup=False)
     if len(lost) > 20:

@@ -16,6 +16,7 @@ import xarray as xr
 from engine import Model, Response, Status
 from engine.simulate import OPENING, PENETRATION, PRESSURE, SLIP
 
+from .axes import Along
 from .plan import Study
 
 
@@ -38,6 +39,12 @@ SCHEMA: dict[str, Variable] = {
     "racking_shear": Variable(("time",), "m", "racking of the box without its rigid rotation"),
     "racking_free_field": Variable(
         ("time",), "m", "racking of the free field", "layered column without the box, between the depths of roof and invert"
+    ),
+    "reference_displacement": Variable(
+        ("time", "component"),
+        "m",
+        "displacement of the free field at the depth of the record, relative to the base",
+        "zero where the record is the motion of the base",
     ),
     "open_fraction": Variable(("time",), "1", "share of the joint length that is open", "carries no pressure"),
     "slip_fraction": Variable(("time",), "1", "share of the joint length that slips"),
@@ -98,8 +105,9 @@ def build_dataset(study: Study, models: Sequence[Model], parts: Sequence[dict[st
     for name, variable in SCHEMA.items():
         ds[name] = _variable(name, variable, study, parts, owner, grid)
     for axis in study.axes:
+        described = {axis.name: Along(axis.values, axis.unit, axis.meaning), **axis.along}
         ds = ds.assign_coords(
-            {axis.name: (axis.name, list(axis.values), _attributes(axis.field.unit or "1", axis.field.meaning))}
+            {name: (axis.name, list(a.values), _attributes(a.unit or "1", a.meaning)) for name, a in described.items()}
         )
     ds = ds.assign_coords(time=("time", grid, _attributes("s", COORDINATES["time"].long_name)))
     model = models[0]

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -14,25 +13,19 @@ import numpy as np
 from pydantic import ValidationError
 
 from engine import LANES, PRESETS, GroundMotion, MotionError, Spec, base_motion, read_at2
-from engine.units import in_si
 
-from .fields import Field, catalogue, nearest, resolve
+from .axes import Axis, swept_axes
+from .fields import catalogue, nearest
 from .messages import StudyError, explain, shown
+from .sizes import DomainSizes, domain_axis, read_sizes
 
 SHIPPED = Path(__file__).parent
 MOTIONS = SHIPPED / "motions"
-MOST_CASES = 1_000_000
+NOT_OF_A_SPEC = ("title", "model", "sweep", "domain_size")
+"""Keys of a study file that are no tables of a Spec."""
+
 MOST_BYTES = 1_000_000
 MOST_NESTED = 20
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One swept field: its short name, the field, its values in SI."""
-
-    name: str
-    field: Field
-    values: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -52,6 +45,7 @@ class Study:
     axes: tuple[Axis, ...]
     cases: tuple[Spec, ...]
     motions: Mapping[str, GroundMotion]
+    sizes: DomainSizes | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -61,9 +55,7 @@ class Study:
     def label(self, case: int) -> str:
         """The case in words: 'p0 = 2e+06 Pa'."""
         index = np.unravel_index(case, self.shape) if self.axes else ()
-        parts = [
-            f"{axis.name} = {shown(axis.values[i])} {axis.field.unit}".strip() for axis, i in zip(self.axes, index, strict=True)
-        ]
+        parts = [f"{axis.name} = {shown(axis.values[i])} {axis.unit}".strip() for axis, i in zip(self.axes, index, strict=True)]
         return ", ".join(parts) or "the only case"
 
     def ground(self, case: int) -> np.ndarray:
@@ -150,13 +142,14 @@ def make_study(table: dict[str, Any], name: str = "study", text: str = "", folde
     if not isinstance(title, str):
         mistakes.append(f"title = {shown(title)}: must be text in quotes")
     base = _base(table, mistakes)
-    axes = _axes(table.get("sweep", {}), mistakes)
+    sizes = _sizes(table, mistakes)
+    axes = [domain_axis(sizes, base or Spec())] if sizes else swept_axes(table.get("sweep", {}), mistakes)
     cases = _cases(base or Spec(), axes, mistakes, only_values=base is None)
     motions = _motions(_records(table, base, cases), folder or Path(), mistakes)
     if mistakes:
         lead = f"{file or name}: "
         raise StudyError([lead + line for line in dict.fromkeys(mistakes)])
-    study = Study(name, title, text, tuple(axes), tuple(cases), motions)
+    study = Study(name, title, text, tuple(axes), tuple(cases), motions, sizes)
     _check_motions(study, file or name)
     return study
 
@@ -167,9 +160,9 @@ def _base(table: dict[str, Any], mistakes: list[str]) -> Spec | None:
     if not isinstance(model, str) or model not in PRESETS:
         mistakes.append(f"model = {shown(model)}: is not a model; must be {' or '.join(PRESETS)}")
         model = "coral-2010"
-    given = {key: value for key, value in table.items() if key not in ("title", "model", "sweep")}
+    given = {key: value for key, value in table.items() if key not in NOT_OF_A_SPEC}
     for key in [key for key in given if key not in Spec.model_fields]:
-        known = [*Spec.model_fields, "title", "model", "sweep"]
+        known = [*Spec.model_fields, *NOT_OF_A_SPEC]
         hint = nearest(key, known) or nearest(key, [field.name for field in catalogue()])
         mistakes.append(f"{key} = {shown(given.pop(key))}: is not a table of a study{hint}")
     try:
@@ -187,98 +180,13 @@ def _merged(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     return both
 
 
-def _axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
-    if not isinstance(sweep, dict):
-        mistakes.append(f"sweep = {shown(sweep)}: must be a table")
-        return []
-    axes: list[Axis] = []
-    for name, written in _flat(sweep).items():
-        field = resolve(name)
-        if field is None:
-            known = [other.name for other in catalogue()]
-            mistakes.append(f"sweep.{name}: is not a field{nearest(name, known)}")
-        elif any(axis.field.name == field.name for axis in axes):
-            mistakes.append(f"sweep.{name}: {field.name} is swept already")
-        else:
-            values = _values(f"sweep.{name}", written, field, mistakes)
-            axes.append(Axis(name.replace(".", "_"), field, tuple(values)))
-    if prod(len(axis.values) for axis in axes) > MOST_CASES:
-        mistakes.append(f"sweep: makes {prod(len(a.values) for a in axes):,} cases; must be at most {MOST_CASES:,}")
-        return []
-    return axes
-
-
-_RANGE = {"from", "to", "num", "spacing"}
-
-
-def _flat(sweep: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Dotted keys of nested tables; a table with keys of a range is a value."""
-    flat: dict[str, Any] = {}
-    for key, value in sweep.items():
-        if isinstance(value, dict) and value and not _RANGE & value.keys():
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[prefix + key] = value
-    return flat
-
-
-def _values(name: str, written: Any, field: Field, mistakes: list[str]) -> list[Any]:
-    """Values of an axis in SI: a list of values and ranges, or one range."""
-    entries = written if isinstance(written, list) else [written]
-    if not isinstance(written, (list, dict)) or not entries:
-        mistakes.append(f"{name} = {shown(written)}: must be a list of at least one value, or {{ from, to, num, spacing }}")
-        return []
-    values: list[Any] = []
-    for entry in entries:
-        values += _range(name, entry, field, mistakes) if isinstance(entry, dict) else _single(name, entry, field, mistakes)
-    for i, value in enumerate(values):
-        if value in values[:i]:
-            mistakes.append(f"{name}: holds {shown(value)} {field.unit} twice".replace("  ", " "))
-            break
-    return values
-
-
-def _single(name: str, entry: Any, field: Field, mistakes: list[str]) -> list[Any]:
-    if isinstance(entry, (list, dict)):
-        mistakes.append(f"{name} = {shown(entry)}: must be a value or a range")
-        return []
-    if not field.unit:
-        return [entry]
-    try:
-        return [in_si(entry, field.unit, unit_required=True)]
-    except ValueError as error:
-        mistakes.append(f"{name} = {shown(entry)}: {error}")
-        return []
-
-
-def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) -> list[float]:
-    """{ from, to, num, spacing = "linear" or "log" } as values."""
-    before = len(mistakes)
-    for key in sorted(entry.keys() - _RANGE):
-        mistakes.append(f"{name}.{key}: is not part of a range; must be from, to, num or spacing")
-    ends = []
-    for key in ("from", "to"):
-        if key not in entry:
-            mistakes.append(f"{name}.{key}: is missing")
-            continue
-        try:
-            ends.append(in_si(entry[key], field.unit or "1", unit_required=True))
-        except ValueError as error:
-            mistakes.append(f"{name}.{key} = {shown(entry[key])}: {error}")
-    num: Any = entry.get("num")
-    spacing = entry.get("spacing", "linear")
-    if "num" not in entry:
-        mistakes.append(f"{name}.num: is missing")
-    elif isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_CASES:
-        mistakes.append(f"{name}.num = {shown(num)}: must be a whole number from 2 to {MOST_CASES:,}")
-    if spacing not in ("linear", "log"):
-        mistakes.append(f'{name}.spacing = {shown(spacing)}: must be "linear" or "log"')
-    elif spacing == "log" and len(ends) == 2 and not (ends[0] > 0 and ends[1] > 0):
-        mistakes.append(f"{name}: a logarithmic range must lie above zero; put the zero beside it, as in [0, {{ from, … }}]")
-    if len(mistakes) > before:
-        return []
-    make = np.geomspace if spacing == "log" else np.linspace
-    return [float(value) for value in make(ends[0], ends[1], num)]
+def _sizes(table: dict[str, Any], mistakes: list[str]) -> DomainSizes | None:
+    """The sizes of the iterative boundary method, where the study is one."""
+    if "domain_size" not in table:
+        return None
+    if "sweep" in table:
+        mistakes.append("domain_size: stands alone; leave out [sweep], or sweep domain_width without it")
+    return read_sizes(table["domain_size"], mistakes)
 
 
 def _cases(base: Spec, axes: list[Axis], mistakes: list[str], only_values: bool) -> list[Spec]:
@@ -290,23 +198,25 @@ def _cases(base: Spec, axes: list[Axis], mistakes: list[str], only_values: bool)
     if not axes:
         return [] if only_values else [base]
     for axis in axes:
-        for value in axis.values:
-            _case(base, [(axis, value)], mistakes, only_values)
+        for settings in axis.settings:
+            _case(base, settings, axis.origin, mistakes, only_values)
     if only_values or len(mistakes) > before or not all(axis.values for axis in axes):
         return []
-    found = [_case(base, list(zip(axes, values, strict=True)), mistakes, False) for values in product(*(a.values for a in axes))]
+    combinations = product(*(axis.settings for axis in axes))
+    found = [_case(base, {k: v for part in parts for k, v in part.items()}, "sweep", mistakes, False) for parts in combinations]
     return [case for case in found if case is not None]
 
 
-def _case(base: Spec, settings: list[tuple[Axis, Any]], mistakes: list[str], only_values: bool) -> Spec | None:
+def _case(base: Spec, settings: Mapping[str, Any], lead: str, mistakes: list[str], only_values: bool) -> Spec | None:
+    """The base with the settings made, or what forbids it, as mistakes that begin with `lead`."""
     table = base.model_dump()
-    for axis, value in settings:
-        *path, last = axis.field.path
+    for name, value in settings.items():
+        *path, last = name.split(".")
         part: Any = table
         for key in path:
             index = int(key) - 1 if isinstance(part, (list, tuple)) else key
             if isinstance(index, int) and not 0 <= index < len(part):
-                mistakes.append(f"sweep.{axis.field.name}: there are {len(part)} layers")
+                mistakes.append(f"{lead}: there are {len(part)} layers")
                 return None
             part = part[index]
         whole = isinstance(part[last], int) and isinstance(value, float) and value.is_integer()
@@ -316,9 +226,7 @@ def _case(base: Spec, settings: list[tuple[Axis, Any]], mistakes: list[str], onl
     except ValidationError as error:
         if only_values and not any(e["loc"] for e in error.errors()):
             return None
-        mistakes.extend(
-            f"sweep.{settings[0][0].name}: {line}" if len(settings) == 1 else f"sweep: {line}" for line in explain(error)
-        )
+        mistakes.extend(f"{lead}: {line}" for line in explain(error))
         return None
 
 

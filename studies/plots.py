@@ -14,7 +14,9 @@ from matplotlib.lines import Line2D
 
 from engine import Status
 
-from .domain_size import SOURCE_TOLERANCE, size_axis
+from .domain_size import SOURCE_SIZE, SOURCE_TOLERANCE, is_domain_size, series_of
+from .sizes import SOURCE_DEPTH
+from .sizes import WIDTH as WIDTH_SERIES
 from .table import axes_of, cases_of, in_words
 
 WIDTH = 180 / 25.4
@@ -39,6 +41,15 @@ STYLE: dict[str, Any] = {
 LINES = (("black", "-"), ("#d95f02", "--"), ("#1f78b4", "-."))
 """Colour and dash of the cases shown, told apart in grey too."""
 
+MANY_LINES = tuple(
+    zip(
+        ("black", "#d95f02", "#1f78b4", "#666666", "#7570b3", "#1b9e77", "#a6761d", "#e7298a"),
+        ("-", "--", "-.", ":", "-", "--", "-.", ":"),
+        "os^Dv<>P",
+        strict=True,
+    )
+)
+
 JOINT_COLOURS = {"open": "#d7191c", "slipping": "#fdae61", "sticking": "#2b2b2b"}
 JOINT_STATES = ("open", "sticking", "slipping", "slipping")
 
@@ -58,8 +69,8 @@ def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
         }
         if len(axes) == 1 and done[axes[0]].dtype.kind in "fi" and done.sizes["case"] > 2:
             drawings["peaks"] = lambda: peaks_figure(done, axes[0])
-        if size_axis(ds):
-            drawings["convergence"] = lambda: convergence_figure(ds, size_axis(ds))
+        if is_domain_size(ds):
+            drawings["convergence"] = lambda: convergence_figure(ds)
     files = []
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         for name, draw in drawings.items():
@@ -211,21 +222,31 @@ def peaks_figure(cases: xr.Dataset, axis: str) -> Figure:
     return fig
 
 
-def convergence_figure(ds: xr.Dataset, axis: str) -> Figure:
-    """Change from size to size of every measure, and the error that remains where it can be certified."""
-    fig = Figure(figsize=(WIDTH, 2.9))
-    panels = fig.subplots(1, 2, sharex=True, sharey=True)
-    styles = (("black", "-", "o"), ("#d95f02", "--", "s"), ("#1f78b4", "-.", "^"), ("#666666", ":", "D"), ("#7570b3", "-", "v"))
-    for ax, name, label in zip(
-        panels, ("epsilon", "remaining_error"), ("change from the size before", "remaining error"), strict=True
-    ):
-        for measure, (colour, dash, marker) in zip(ds["measure"].values, styles, strict=True):
-            values = 100 * ds[name].sel(measure=measure)
-            ax.plot(ds[axis], values, color=colour, ls=dash, marker=marker, markersize=3.5, label=str(measure))
-        ax.set(yscale="log", xlabel=f"{_symbol(axis)} [m]", title=label)
-    panels[0].set_ylabel("[%]")
-    panels[0].axhline(100 * SOURCE_TOLERANCE, color="0.6", lw=0.7, zorder=0, label="the source's 2.16 %")
-    fig.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
+def convergence_figure(ds: xr.Dataset) -> Figure:
+    """Of every series the change of all measures from size to size, and below it the error that remains where certified."""
+    series = series_of(ds)
+    fig = Figure(figsize=(WIDTH, 4.6))
+    panels = fig.subplots(2, len(series), sharex="col", sharey=True, squeeze=False)
+    for column, (name, chosen) in zip(panels.T, series.items(), strict=True):
+        for ax, what in zip(column, ("epsilon", "remaining_error"), strict=True):
+            for measure, (colour, dash, marker) in zip(ds["measure"].values, MANY_LINES, strict=True):
+                values = 100 * chosen[what].sel(measure=measure).values
+                ax.plot(chosen["size"], values, color=colour, ls=dash, marker=marker, markersize=3.5, label=str(measure))
+            ax.axhline(100 * ds.attrs["domain_size_tolerance"], color="0.6", lw=0.7, zorder=0, label="tolerance")
+            ax.set_yscale("log")
+            ax.yaxis.set_major_formatter("{x:g}")
+            ax.set_xlim(left=0.9 * float(chosen["size"][0]))
+        column[0].set_title(name)
+        column[1].set_xlabel(f"{name.split(',')[0]} [m]")
+        if name == WIDTH_SERIES:
+            column[0].plot(
+                SOURCE_SIZE[0], 100 * SOURCE_TOLERANCE, "*", color="black", ms=9, label="u_x at A, the source's 2.16 %"
+            )
+        if name == SOURCE_DEPTH:
+            column[1].text(0.5, 0.5, "never certified", transform=column[1].transAxes, ha="center")
+    panels[0, 0].set_ylabel("change from the size before [%]")
+    panels[1, 0].set_ylabel("remaining error [%]")
+    fig.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return fig
 
 

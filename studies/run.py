@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from engine import MeshError, Model, Spec, Status, build_model, free_field, simulate_cases
+from engine import MeshError, Model, Spec, Status, build_model, carried_down, free_field, simulate_cases
 
 from .dataset import build_dataset, case_arrays
 from .domain_size import with_convergence
@@ -67,7 +67,8 @@ def run_study(study: Study, workers: int | None = None, progress: Progress | Non
         found.append(_emptied(whole, len(batch.cases), outcome) if isinstance(outcome, Lost) else outcome)
         for lane, case in enumerate(batch.cases):
             owner[case] = b, lane
-    return with_convergence(build_dataset(study, [each.model for each in found], [each.arrays for each in found], owner))
+    ds = build_dataset(study, [each.model for each in found], [each.arrays for each in found], owner)
+    return with_convergence(ds, study.sizes) if study.sizes else ds
 
 
 def _emptied(whole: Outcome, n_case: int, lost: Lost) -> Outcome:
@@ -156,6 +157,8 @@ def _one_thread() -> Iterator[None]:
 def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress | None = None) -> Outcome:
     """March one batch with its free field, and gather what the dataset holds of it."""
     model = build_model(specs[0])
+    depths = [spec.motion.reference_depth or spec.domain.depth for spec in specs]
+    motions = [_at_the_base(model, motion, depth) for motion, depth in zip(motions, depths, strict=True)]
     told = 0
 
     def tell(step: int) -> None:
@@ -166,7 +169,7 @@ def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress |
 
     response = simulate_cases(model, specs, motions, tell)
     tell(len(motions[0]) - 1)
-    field = free_field(model, motions)
+    field = free_field(model, motions, depths)
     every = model.spec.output.every
     base = np.zeros((len(specs), len(response.time), 2))
     for lane, motion in enumerate(motions):
@@ -175,11 +178,17 @@ def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress |
     extra = {
         "racking_free_field": field.racking,
         "peak_racking_free_field": field.peak,
+        "reference_displacement": field.reference,
         "base_acceleration": base,
         "peak_base_acceleration": np.array([np.abs(motion).max(axis=0) for motion in motions]),
         "uplift_over_weight": np.array([uplift_over_weight(spec) for spec in specs]),
     }
     return Outcome(model, case_arrays(model, response, extra))
+
+
+def _at_the_base(model: Model, motion: np.ndarray, depth: float) -> np.ndarray:
+    """The base motion that moves the free field at `depth` as `motion`."""
+    return motion if depth == model.spec.domain.depth else carried_down(model, [motion], depth)[0]
 
 
 def uplift_over_weight(spec: Spec) -> float:

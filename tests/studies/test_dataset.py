@@ -60,6 +60,7 @@ NOT_OF_THE_RESPONSE = {
     "reason",
     "racking_free_field",
     "peak_racking_free_field",
+    "reference_displacement",
     "frequency",
     "base_acceleration",
     "peak_base_acceleration",

@@ -115,7 +115,7 @@ def test_words_and_truth_values_can_be_swept():
 def test_keys_of_the_sweep(key, name, field):
     """A key is a short or dotted name; dimensions are called as written, with underscores (DESIGN section 5)."""
     (found,) = study_of(key if key.startswith("[") else f"[sweep]\n{key}").axes
-    assert (found.name, found.field.name) == (name, field)
+    assert (found.name, *found.settings[0]) == (name, field)
 
 
 def test_layer_of_a_dotted_key_is_the_one_that_changes():

@@ -1,0 +1,143 @@
+"""The dimensions of a study: what is swept, and which fields each value sets."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from engine.units import in_si
+
+from .fields import Field, catalogue, nearest, resolve
+from .messages import shown
+
+MOST_CASES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Along:
+    """A further coordinate along an axis."""
+
+    values: tuple[Any, ...]
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One dimension of a study.
+
+    origin : where the study file says it, for messages; values : as its coordinate holds them, in `unit`
+    settings : for each value the fields it sets, dotted name -> value in SI
+    """
+
+    origin: str
+    name: str
+    unit: str
+    meaning: str
+    values: tuple[Any, ...]
+    settings: tuple[Mapping[str, Any], ...]
+    along: Mapping[str, Along] = field(default_factory=dict)
+
+    @classmethod
+    def of_field(cls, name: str, swept: Field, values: list[Any]) -> "Axis":
+        """The axis along which one field takes `values`."""
+        return cls(
+            f"sweep.{swept.name}", name, swept.unit, swept.meaning, tuple(values), tuple({swept.name: value} for value in values)
+        )
+
+
+def swept_axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
+    """One axis for every key of [sweep]."""
+    if not isinstance(sweep, dict):
+        mistakes.append(f"sweep = {shown(sweep)}: must be a table")
+        return []
+    axes: dict[str, Axis] = {}
+    for name, written in _flat(sweep).items():
+        field = resolve(name)
+        if field is None:
+            known = [other.name for other in catalogue()]
+            mistakes.append(f"sweep.{name}: is not a field{nearest(name, known)}")
+        elif field.name in axes:
+            mistakes.append(f"sweep.{name}: {field.name} is swept already")
+        else:
+            values = _values(f"sweep.{name}", written, field, mistakes)
+            axes[field.name] = Axis.of_field(name.replace(".", "_"), field, values)
+    if (count := prod(len(axis.values) for axis in axes.values())) > MOST_CASES:
+        mistakes.append(f"sweep: makes {count:,} cases; must be at most {MOST_CASES:,}")
+        return []
+    return list(axes.values())
+
+
+_RANGE = {"from", "to", "num", "spacing"}
+
+
+def _flat(sweep: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Dotted keys of nested tables; a table with keys of a range is a value."""
+    flat: dict[str, Any] = {}
+    for key, value in sweep.items():
+        if isinstance(value, dict) and value and not _RANGE & value.keys():
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[prefix + key] = value
+    return flat
+
+
+def _values(name: str, written: Any, field: Field, mistakes: list[str]) -> list[Any]:
+    """Values of an axis in SI: a list of values and ranges, or one range."""
+    entries = written if isinstance(written, list) else [written]
+    if not isinstance(written, (list, dict)) or not entries:
+        mistakes.append(f"{name} = {shown(written)}: must be a list of at least one value, or {{ from, to, num, spacing }}")
+        return []
+    values: list[Any] = []
+    for entry in entries:
+        values += _range(name, entry, field, mistakes) if isinstance(entry, dict) else _single(name, entry, field, mistakes)
+    for i, value in enumerate(values):
+        if value in values[:i]:
+            mistakes.append(f"{name}: holds {shown(value)} {field.unit} twice".replace("  ", " "))
+            break
+    return values
+
+
+def _single(name: str, entry: Any, field: Field, mistakes: list[str]) -> list[Any]:
+    if isinstance(entry, (list, dict)):
+        mistakes.append(f"{name} = {shown(entry)}: must be a value or a range")
+        return []
+    if not field.unit:
+        return [entry]
+    try:
+        return [in_si(entry, field.unit, unit_required=True)]
+    except ValueError as error:
+        mistakes.append(f"{name} = {shown(entry)}: {error}")
+        return []
+
+
+def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) -> list[float]:
+    """{ from, to, num, spacing = "linear" or "log" } as values."""
+    before = len(mistakes)
+    for key in sorted(entry.keys() - _RANGE):
+        mistakes.append(f"{name}.{key}: is not part of a range; must be from, to, num or spacing")
+    ends = []
+    for key in ("from", "to"):
+        if key not in entry:
+            mistakes.append(f"{name}.{key}: is missing")
+            continue
+        try:
+            ends.append(in_si(entry[key], field.unit or "1", unit_required=True))
+        except ValueError as error:
+            mistakes.append(f"{name}.{key} = {shown(entry[key])}: {error}")
+    num: Any = entry.get("num")
+    spacing = entry.get("spacing", "linear")
+    if "num" not in entry:
+        mistakes.append(f"{name}.num: is missing")
+    elif isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_CASES:
+        mistakes.append(f"{name}.num = {shown(num)}: must be a whole number from 2 to {MOST_CASES:,}")
+    if spacing not in ("linear", "log"):
+        mistakes.append(f'{name}.spacing = {shown(spacing)}: must be "linear" or "log"')
+    elif spacing == "log" and len(ends) == 2 and not (ends[0] > 0 and ends[1] > 0):
+        mistakes.append(f"{name}: a logarithmic range must lie above zero; put the zero beside it, as in [0, {{ from, … }}]")
+    if len(mistakes) > before:
+        return []
+    make = np.geomspace if spacing == "log" else np.linspace
+    return [float(value) for value in make(ends[0], ends[1], num)]
