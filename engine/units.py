@@ -12,6 +12,12 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?
 _NO_UNIT = re.compile(r"[\d)]\s*(\*\*|\^)|\d{3}")
 """Powers of numbers and of brackets, long numbers: sums to be worked out, not units."""
 
+_MEANT = {
+    ("g", "m/s**2"): " (the gram); the standard gravity is g_0",
+    ("gal", "m/s**2"): " (the gallon); the unit of gravimetry is Gal",
+}
+"""What to say where a unit of another kind has the name of the one that is meant."""
+
 
 @cache
 def _registry() -> Any:
@@ -34,7 +40,8 @@ def _factor(written: str, wanted: str) -> float:
     except pint.DimensionalityError:
         if wanted == "dimensionless":
             raise ValueError(f"must be a number without a unit (dimensionless), not one in {written}") from None
-        raise ValueError(f"must be a quantity in {wanted} or a unit like it, {written} is not") from None
+        hint = _MEANT.get((written, wanted), "")
+        raise ValueError(f"must be a quantity in {wanted} or a unit like it, {written} is not{hint}") from None
     except Exception:  # pint passes on whatever its parser met
         raise ValueError(f"unit {written!r} is not known; must be a unit like {wanted}") from None
     if angular:

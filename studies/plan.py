@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from engine import LANES, PRESETS, GroundMotion, MotionError, Spec, base_motion, read_at2
+from engine import LANES, PRESETS, GroundMotion, MotionError, Spec, base_motion, read_record
+from engine.spec import GENERATED, Motion
 
 from .axes import Axis, swept_axes
 from .fields import catalogue, nearest
@@ -60,9 +61,7 @@ class Study:
 
     def ground(self, case: int) -> np.ndarray:
         """Base acceleration (n_step + 1, 2) [m/s²] of a case."""
-        spec = self.cases[case]
-        records = [self.motions.get(name) for name in (spec.motion.record, spec.motion.vertical_record)]
-        return base_motion(spec.motion, spec.time, *records)
+        return base_motion(self.cases[case], self.motions)
 
     @cached_property
     def batches(self) -> tuple[Batch, ...]:
@@ -75,7 +74,7 @@ class Study:
 
 def _shared(spec: Spec) -> str:
     """What cases of one batch have in common: all but pressure, motion, gravity and friction, which are a lane's own."""
-    shared = spec.model_dump(exclude={"pressure", "motion", "gravity"})
+    shared = spec.model_dump(exclude={"pressure", "motion", "synthetic", "ricker", "gravity"})
     for layer in shared["layer"]:
         del layer["friction"]
     return json.dumps(shared, sort_keys=True)
@@ -230,25 +229,45 @@ def _case(base: Spec, settings: Mapping[str, Any], lead: str, mistakes: list[str
         return None
 
 
-def _records(table: dict[str, Any], base: Spec | None, cases: list[Spec]) -> dict[str, str]:
-    """Every record the study names, with the field that names it; also where the rest of the study is wrong."""
-    named = [spec.motion.model_dump() for spec in cases or ([base] if base else [])]
-    if not named and isinstance(table.get("motion"), dict):
-        named = [table["motion"]]
-    fields = ("record", "vertical_record")
-    return {m[f]: f for m in named for f in fields if isinstance(m.get(f), str) and m[f] != "none"}
+Said = tuple[float | None, str | None]
+"""The time step [s] and the unit that a study states for a record."""
 
 
-def _motions(records: dict[str, str], folder: Path, mistakes: list[str]) -> dict[str, GroundMotion]:
+def _records(table: dict[str, Any], base: Spec | None, cases: list[Spec]) -> dict[str, tuple[str, set[Said]]]:
+    """Every record file the study names: the field that names it and what is said of it, nothing where [motion] is wrong.
+
+    Also where the rest of the study is wrong.
+    """
+    motions: list[Any] = list(dict.fromkeys(spec.motion for spec in cases or ([base] if base else []))) or [table.get("motion")]
+    named: dict[str, tuple[str, set[Said]]] = {}
+    for motion in motions:
+        try:
+            checked = Motion.model_validate(motion, context={"from_file": True})
+            fields, said = checked.model_dump(), {(checked.record_dt, checked.record_unit)}
+        except ValidationError:
+            fields, said = motion if isinstance(motion, dict) else {}, set()
+        for field in ("record", "vertical_record"):
+            name = fields.get(field)
+            if isinstance(name, str) and name not in ("none", *GENERATED):
+                named.setdefault(name, (field, set()))[1].update(said)
+    return named
+
+
+def _motions(records: dict[str, tuple[str, set[Said]]], folder: Path, mistakes: list[str]) -> dict[str, GroundMotion]:
     """The records by name, each read once: sought beside the study, then among those shipped."""
     motions: dict[str, GroundMotion] = {}
-    for name, field in records.items():
+    for name, (field, said) in records.items():
         path = next((root / name for root in (folder, MOTIONS, SHIPPED) if _safely((root / name).is_file)), None)
         try:
             if path is None:
                 shipped = ", ".join(sorted(p.name for p in MOTIONS.glob("*.AT2")))
-                raise MotionError(f"no such file beside the study, nor among those shipped ({shipped})")
-            motions[name] = read_at2(path)
+                raise MotionError(
+                    f"no such file beside the study, nor among those shipped ({shipped}); {' and '.join(GENERATED)} are generated"
+                )
+            if len(said) > 1:
+                raise MotionError("a record has one time step and one unit; record_dt and record_unit cannot be swept")
+            for dt, unit in said:
+                motions[name] = read_record(path, dt, unit)
         except MotionError as error:
             mistakes.append(f"motion.{field} = {shown(name)}: {error}")
     return motions
@@ -262,13 +281,13 @@ def _safely(question: Callable[[], bool]) -> bool:
 
 
 def _check_motions(study: Study, file: str) -> None:
-    """Prepare the motion of each kind of case once, so that a record that cannot be scaled is found before anything runs."""
-    seen = {(spec.motion, spec.time): i for i, spec in enumerate(study.cases)}
+    """Prepare the motion of each kind of case once, so that one that cannot be made or scaled is found before anything runs."""
+    seen = {(spec.motion, spec.synthetic, spec.ricker, spec.time): i for i, spec in enumerate(study.cases)}
     mistakes = []
     for case in seen.values():
         try:
             study.ground(case)
         except MotionError as error:
-            mistakes.append(f"{file}: motion.record = {shown(study.cases[case].motion.record)}: {error}")
+            mistakes.append(f"{file}: {error}")
     if mistakes:
         raise StudyError(list(dict.fromkeys(mistakes)))

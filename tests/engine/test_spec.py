@@ -161,7 +161,7 @@ def test_every_quantity_refuses_what_is_no_quantity(table, field, unit):
 @pytest.mark.parametrize(("table", "field", "unit"), quantities())
 def test_bare_number_is_refused_from_a_file_alone(table, field, unit):
     value = getattr(getattr(Spec(), table), field)
-    value = 1.0 if value is None else value
+    value = 12.0 if value is None else value  # a reference domain of 12 m x 12 m holds the box
     assert Spec.model_validate({table: {field: value}}) is not None
     if unit == "1" or value == 0.0:
         assert Spec.model_validate({table: {field: value}}, context=FILE) is not None

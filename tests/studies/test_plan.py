@@ -288,7 +288,7 @@ def test_a_folder_is_no_study(tmp_path):
 def test_a_missing_file_is_told_with_the_shipped_names(name):
     (line,) = mistakes_of(name)
     assert line.startswith(f'"{name[:50]}')
-    assert "there is no such file, nor a shipped study of that name (damping, domain_size, p0, paper, scale" in line
+    assert "there is no such file, nor a shipped study of that name (damping, domain_size, grid, p0, paper, scale" in line
 
 
 # shipped studies -----------------------------------------------------------------------------------------------------------
@@ -330,11 +330,12 @@ def test_paper_keeps_the_sources_numbers():
     assert spec.motion.peak == pytest.approx(1.7085, rel=1e-14)
 
 
-def test_studies_in_the_readme_are_valid():
+def test_studies_in_the_readme_are_valid(tmp_path):
+    (tmp_path / "site.csv").write_text("t, a\n" + "".join(f"{0.01 * i:.2f}, {100 * (-1) ** i}\n" for i in range(50)))
     blocks = re.findall(r"```toml\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
     for block in blocks:
-        assert make_study(tomllib.loads(block)).cases
+        assert make_study(tomllib.loads(block), folder=tmp_path).cases
 
 
 def test_damping_and_scale_sweep_nine_values_each():
@@ -345,3 +346,107 @@ def test_damping_and_scale_sweep_nine_values_each():
     factors = [spec.motion.scale for spec in scale.cases]
     np.testing.assert_allclose(factors, 0.25 * 2.0 ** (np.arange(9) / 2), rtol=1e-14)  # rounding of the powers
     assert (len(damping.batches), len(scale.batches)) == (9, 1)  # the damping is in the factor, the scale in the load
+
+
+# motions -------------------------------------------------------------------------------------------------------------------
+
+COLUMN = "".join(f"{value}\n" for value in (0.0, 50.0, -100.0, 50.0, 0.0))
+TABLE = "t;a\n" + "".join(f"{0.02 * i:.2f};{value}\n" for i, value in enumerate((0.0, 50.0, -100.0, 50.0, 0.0)))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "column.txt").write_text(COLUMN)
+    (tmp_path / "table.csv").write_text(TABLE)
+    return tmp_path
+
+
+def motion_mistakes(text, folder=None):
+    with pytest.raises(StudyError) as caught:
+        study_of(text, folder)
+    return caught.value.mistakes
+
+
+def test_text_records_take_step_and_unit_from_the_study(folder):
+    text = '[motion]\nrecord = "column.txt"\nvertical_record = "table.csv"\nrecord_dt = "20 ms"\nrecord_unit = "Gal"\n'
+    study = study_of(text, folder)
+    assert list(study.motions) == ["column.txt", "table.csv"]
+    for motion in study.motions.values():
+        assert motion.dt == 0.02
+        np.testing.assert_allclose(motion.acceleration, [0.0, 0.5, -1.0, 0.5, 0.0], rtol=1e-15)
+
+
+def test_generated_motions_need_no_file(tmp_path):
+    (tmp_path / "ricker").write_text("no record")  # a file of that name is not meant
+    text = '[motion]\nrecord = "synthetic"\nvertical_record = "ricker"\nvertical_peak = "0.5 m/s**2"\n[synthetic]\nseed = 3\n'
+    study = study_of(text, tmp_path)
+    assert not study.motions
+    ground = study.ground(0)
+    assert ground.shape == (4001, 2)
+    assert np.abs(ground).max(axis=0) == pytest.approx([1.7085, 0.5], rel=1e-14)
+    assert np.argmax(np.abs(ground[:, 1])) == 200  # the wavelet arrives at 1 s
+
+
+def test_records_and_generated_motions_can_be_swept_together():
+    study = study_of('[sweep]\nrecord = ["synthetic", "ricker", "none", "ridgecrest-2019-clc-360.AT2"]')
+    assert list(study.motions) == ["ridgecrest-2019-clc-360.AT2"]
+    peaks = [np.abs(study.ground(case)).max() for case in range(4)]
+    assert peaks == pytest.approx([1.7085, 1.7085, 0.0, 1.7085], rel=1e-14)
+
+
+def test_a_missing_record_is_told_with_what_there_is():
+    (line,) = motion_mistakes('[motion]\nrecord = "ricket"\n')
+    assert line == (
+        'quick.toml: motion.record = "ricket": no such file beside the study, nor among those shipped '
+        "(ridgecrest-2019-clc-090.AT2, ridgecrest-2019-clc-360.AT2, ridgecrest-2019-clc-up.AT2); "
+        "synthetic and ricker are generated"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('record = "column.txt"\nrecord_unit = "Gal"', 'column.txt": column.txt: a record of one column needs motion.record_dt'),
+        ('record = "table.csv"', 'record = "table.csv": table.csv: a record of columns of text needs motion.record_unit'),
+        ('record_unit = "Gal"', "is a PEER record and states its own time step and unit; leave out motion.record_unit"),
+        (
+            'vertical_record = "table.csv"\nrecord = "none"\nrecord_unit = "Gal"\nrecord_dt = "0.01 s"',
+            'motion.vertical_record = "table.csv": table.csv: its times step by 0.02 s, motion.record_dt says 0.01 s',
+        ),
+        (
+            'record = "column.txt"\nrecord_unit = "g_0"\nrecord_dt = "0.01 s"',
+            "reaches 100 g; no earthquake has been recorded above 5 g; is the unit right?",
+        ),
+    ],
+)  # fmt: skip
+def test_a_record_that_cannot_be_used_is_one_mistake(text, message, folder):
+    (line,) = motion_mistakes(f"[motion]\n{text}\n", folder)
+    assert line.startswith("quick.toml: motion.")
+    assert message in line
+
+
+@pytest.mark.parametrize("sweep", ['record_dt = ["0.01 s", "0.02 s"]', 'record_unit = ["Gal", "m/s**2"]'])
+def test_step_and_unit_of_a_record_cannot_be_swept(sweep, folder):
+    text = '[motion]\nrecord = "column.txt"\nrecord_unit = "Gal"\nrecord_dt = "0.01 s"\n[sweep]\n'
+    (line,) = motion_mistakes(text + sweep, folder)
+    assert line.endswith("a record has one time step and one unit; record_dt and record_unit cannot be swept")
+
+
+def test_a_wrong_motion_table_is_told_without_its_consequences(folder):
+    """The record is there; that it cannot be read without the step that is written wrongly is no second mistake."""
+    (line,) = motion_mistakes('[motion]\nrecord = "column.txt"\nrecord_unit = "Gal"\nrecord_dt = "soon"\n', folder)
+    assert line.startswith('quick.toml: motion.record_dt = "soon"')
+    first, second = motion_mistakes('[motion]\nrecord = "other.txt"\nrecord_unit = "g"\n', folder)
+    assert "the standard gravity is g_0" in first
+    assert "no such file" in second
+
+
+def test_records_are_read_where_another_table_is_wrong(folder):
+    first, second = motion_mistakes('[motion]\nrecord = "table.csv"\n[box]\nwidth = "-1 m"\n', folder)
+    assert "box.width" in first
+    assert "needs motion.record_unit" in second
+
+
+def test_a_generator_that_does_not_fit_is_told_before_anything_runs():
+    (line,) = motion_mistakes('[motion]\nrecord = "ricker"\n[ricker]\nfrequency = "100 Hz"\n')
+    assert line == 'quick.toml: motion.record = "ricker": ricker.frequency = 100 Hz: needs a time.dt of at most 0.0025 s'
