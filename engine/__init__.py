@@ -8,20 +8,26 @@ from .assembly import Constraints, JointMaterial, JointPoints, Material, System,
 from .boxmesh import BoxMesh, box_mesh, column_mesh
 from .carry import carried_down
 from .column import FreeField, free_field
+from .groundmotion import GroundMotion, MotionError
 from .kernels.jit import LANES
 from .mesh import Mesh, MeshError, Probe
 from .model import Model, build_model, newmark_of, simulate_cases
 from .modes import natural_frequencies, rayleigh_coefficients
-from .motion import GroundMotion, MotionError, base_motion, read_at2
+from .motion import base_motion
 from .newmark import Newmark, Rayleigh, Stepper
 from .recorder import Recorder
-from .simulate import ConvergenceError, Response, Status, simulate
+from .records import read_record
+from .simulate import ConvergenceError, Response, Status, Trace, simulate
 from .spec import PRESETS, Spec
+from .spectrum import PERIODS, response_spectrum
 from .state import Lanes, State
 from .static import equilibrium
+from .synthetic import ricker, synthetic
+from .warm import compile_kernels
 
 __all__ = [
     "LANES",
+    "PERIODS",
     "PRESETS",
     "BoxMesh",
     "Constraints",
@@ -46,18 +52,23 @@ __all__ = [
     "Status",
     "Stepper",
     "System",
+    "Trace",
     "base_motion",
     "box_mesh",
     "build_model",
     "build_system",
     "carried_down",
     "column_mesh",
+    "compile_kernels",
     "equilibrium",
     "free_field",
     "natural_frequencies",
     "newmark_of",
     "rayleigh_coefficients",
-    "read_at2",
+    "read_record",
+    "response_spectrum",
+    "ricker",
     "simulate",
     "simulate_cases",
+    "synthetic",
 ]

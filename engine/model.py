@@ -10,7 +10,7 @@ from .boxmesh import box_mesh
 from .mesh import Floats
 from .modes import natural_frequencies, rayleigh_coefficients
 from .newmark import Newmark, Rayleigh, Stepper
-from .simulate import Response, simulate
+from .simulate import Response, Trace, simulate
 from .spec import Domain, Spec
 from .state import Lanes
 
@@ -99,9 +99,13 @@ def newmark_of(spec: Spec) -> Newmark:
 
 
 def simulate_cases(
-    model: Model, specs: Sequence[Spec], motions: Sequence[Floats], progress: Callable[[int], None] | None = None
+    model: Model,
+    specs: Sequence[Spec],
+    motions: Sequence[Floats],
+    progress: Callable[[int], None] | None = None,
+    trace: Callable[[Trace], None] | None = None,
 ) -> Response:
-    """March cases that share `model` side by side; motions (n_step + 1, 2) [m/s²] of each."""
+    """March cases that share `model` side by side; motions (n_step + 1, 2) [m/s²] of each. The rest is as in `simulate`."""
     loads = [(model.weight(spec), model.pressure(spec)) for spec in specs]
     laws = [model.system.joint_law(model.joint_materials(spec)) for spec in specs]
     lanes = Lanes.of([weight + pressure for weight, pressure in loads], laws, list(motions))
@@ -110,4 +114,4 @@ def simulate_cases(
         static[0][:, lane], static[1][:, lane] = pair
     stepper = Stepper(model.system, newmark_of(model.spec), model.rayleigh)
     every = model.spec.output.every
-    return simulate(stepper, lanes, static, model.frequencies[0], every=every, progress=progress)
+    return simulate(stepper, lanes, static, model.frequencies[0], every=every, progress=progress, trace=trace)

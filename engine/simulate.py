@@ -41,11 +41,24 @@ class ConvergenceError(RuntimeError):
 
 
 @dataclass(frozen=True)
+class Trace:
+    """One step of the first lane: number, time [s], joint states (n_point,), direct solves, residual, whether it was halved."""
+
+    step: int
+    time: float
+    states: np.ndarray
+    rounds: int
+    residual: float
+    halved: bool
+
+
+@dataclass(frozen=True)
 class Response:
     """What a batch did, lane first. A failed lane holds NaN and says why in `reason`.
 
     time : (n_time,) [s]; values : (n_lane, n_time, n_value) in the recorder's order
     fractions : (n_lane, n_time, 2) of the joint length that is open, that slips
+    states : (n_lane, n_time, n_point) joint states as kernels.joint numbers them, -1 in a failed lane
     peaks : (n_lane, 2, n_value) largest magnitudes, total and minus static
     joint_peaks : (n_lane, 4, n_point) opening [m], slip [m], pressure [Pa], penetration [m]
     first_slip : (n_lane, n_point) [s] when a closed point first slid beyond its elastic range before the shaking, NaN where never
@@ -60,6 +73,7 @@ class Response:
     time: Floats
     values: Floats
     fractions: Floats
+    states: np.ndarray
     peaks: Floats
     joint_peaks: Floats
     first_slip: Floats
@@ -87,16 +101,22 @@ def simulate(
     every: int = 1,
     throw: bool = False,
     progress: Callable[[int], None] | None = None,
+    trace: Callable[[Trace], None] | None = None,
 ) -> Response:
     """March all lanes from their equilibrium under `static_loads` (n_dof, LANES) to the end of their motions.
 
     Histories keep every `every`-th step, peaks see all. `throw` raises ConvergenceError for the first failed lane; otherwise
-    failure is a status. `progress` is called with the number of steps done, every hundred.
+    failure is a status. `progress` is called with the number of steps done, every hundred; `trace` with every step
+    that the first lane survives.
     """
     run = _Run(stepper, lanes, every)
     run.settle(static_loads, first_frequency)
+    if trace is not None:
+        trace(run.traced(0))
     for step in range(1, len(lanes.ground)):
-        run.advance(step)
+        report = run.advance(step)
+        if trace is not None and run.alive[0]:
+            trace(run.traced(step, report))
         if progress is not None and step % 100 == 0:
             progress(step)
         if not run.alive.any():
@@ -123,6 +143,7 @@ class _Run:
         self.values: Floats = np.zeros((n_value, LANES))
         self.kept: Floats = np.full((n_kept, n_value, LANES), np.nan)
         self.fractions: Floats = np.full((n_kept, 2, LANES), np.nan)
+        self.states = np.full((n_kept, LANES, n_point), -1, dtype=np.int8)
         self.peaks: Floats = np.zeros((2, n_value, LANES))
         self.joint_peaks: Floats = np.zeros((4, LANES, n_point))
         self.first_slip: Floats = np.full((LANES, n_point), np.nan)
@@ -161,7 +182,12 @@ class _Run:
         self.elastic_range = self.lanes.law.mu * np.abs(force[:, :, 0]) / self.lanes.law.k_s
         self._observe(0)
 
-    def advance(self, step: int) -> None:
+    def traced(self, step: int, report: StepReport | None = None) -> Trace:
+        """What the first lane did in a step; without a report, what it is before the first one."""
+        found = (int(report.rounds[0]), float(report.residual[0]), bool(report.halved[0])) if report else (0, 0.0, False)
+        return Trace(step, step * self.stepper.newmark.dt, self.state.contact.state[0].copy(), *found)
+
+    def advance(self, step: int) -> StepReport:
         """One step of all lanes and what is read from it."""
         ground = self.lanes.ground
         report = self.stepper.step(self.state, self.lanes, ground[step - 1], ground[step])
@@ -169,6 +195,7 @@ class _Run:
         audit(self.state.energy, self.start_energy, self.account)
         product(self._operator, self.state.motion.u, self.values)
         self._observe(step)
+        return report
 
     def _judge(self, step: int, report: StepReport) -> None:
         n = self.lanes.n_lane
@@ -211,6 +238,7 @@ class _Run:
         if step % self.every == 0:
             row = step // self.every
             self.kept[row] = self.values
+            self.states[row] = self.state.contact.state
             joint_fractions(self.state.contact.state, self.system.points.length, n, self.fractions[row])
 
     def response(self) -> Response:
@@ -219,6 +247,7 @@ class _Run:
         scale = np.maximum(self.account[2], RESOLVED * self.start_energy.sum(axis=0))
         scale[scale == 0.0] = 1.0
         failed = self.status[:n] >= Status.NOT_CONVERGED
+        self.states[:, :n][:, failed] = -1
         expand = self.system.expand
 
         def of_lanes(array: Floats, axis: int) -> Floats:
@@ -231,6 +260,7 @@ class _Run:
             time=self.stepper.newmark.dt * self.every * np.arange(len(self.kept), dtype=float),
             values=of_lanes(self.kept, 2),
             fractions=of_lanes(self.fractions, 2),
+            states=np.moveaxis(self.states[:, :n], 1, 0),
             peaks=of_lanes(self.peaks, 2),
             joint_peaks=of_lanes(self.joint_peaks, 1),
             first_slip=of_lanes(self.first_slip, 0),

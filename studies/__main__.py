@@ -1,4 +1,4 @@
-"""The command line: run, check, plot, table, list, schema."""
+"""The command line: run, check, plot, show, table, list, schema."""
 
 import os
 import sys
@@ -22,7 +22,8 @@ from .domain_size import convergence_sentences, is_domain_size, source_sentence
 from .fields import catalogue
 from .messages import StudyError
 from .plan import Study, load_study, shipped_studies
-from .run import run_study, write_dataset
+from .run import run_study, trace_case, write_dataset
+from .show import TRACE_HEAD, show_lines, trace_line
 from .table import axes_of, failures, sentences
 from .table import table as table_of
 
@@ -78,11 +79,16 @@ def run_command(
     workers: Workers = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="compute anew what is there already")] = False,
     figures: Annotated[bool, typer.Option("--plot", help="draw the figures too")] = False,
+    case: Annotated[int | None, typer.Option(min=1, help="the case to --trace, counted from 1 in the order of `table`")] = None,
+    trace: Annotated[bool, typer.Option("--trace", help="print one case step by step, write nothing")] = False,
 ) -> None:
     """Run studies; write a netCDF file for each, and say what happened."""
     names = list(shipped_studies()) if everything else studies or []
     if not names:
         raise _refuse(["run: name a study, or say --all (coralquake list shows what is shipped)"])
+    if trace or case is not None:
+        _trace(names, case, trace)
+        return
     if out_file is not None and len(names) > 1:
         raise _refuse([f"--out {out_file}: is for one study, {len(names)} are named"])
     loaded = _load_all(names)
@@ -102,6 +108,24 @@ def run_command(
             _draw(ds, path)
     out.print(_summary(rows))
     raise typer.Exit(SOME_FAILED if failed else DONE)
+
+
+def _trace(names: list[str], case: int | None, trace: bool) -> None:
+    """Print one case of one study step by step."""
+    if not trace:
+        raise _refuse([f"--case {case}: is for --trace"])
+    if len(names) > 1:
+        raise _refuse([f"--trace: is for one study, {len(names)} are named"])
+    (study,) = _load_all(names)
+    n = len(study.cases)
+    if (case is None and n > 1) or (case is not None and case > n):
+        raise _refuse([f"--case{'' if case is None else f' {case}'}: must be a number from 1 to {n}, the cases of {study.name}"])
+    index = (case or 1) - 1
+    print(f"case {index + 1} of {n}: {study.label(index)}")
+    print(TRACE_HEAD)
+    status, reason = trace_case(study, index, lambda step, model: print(trace_line(step, model)))
+    print(f"{status.name.lower().replace('_', ' ')}{f': {reason}' if reason else ''}")
+    raise typer.Exit(SOME_FAILED if reason else DONE)
 
 
 def _load_all(names: list[str]) -> list[Study]:
@@ -220,6 +244,13 @@ def _draw(ds: xr.Dataset, path: Path) -> None:
 def plot(results: ResultFile) -> None:
     """Draw the figures of a results file beside it."""
     _draw(_open(results), results)
+
+
+@app.command()
+def show(results: ResultFile) -> None:
+    """Say what a results file is: study, provenance, axes, how the cases ended, every variable with unit and meaning."""
+    for line in show_lines(_open(results)):
+        out.print(line, markup=False, soft_wrap=True)
 
 
 @app.command("table")

@@ -1,11 +1,15 @@
 """What `check` says beforehand: size of the study, quality of its mesh and step, and inputs that are legal but suspicious."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from functools import lru_cache
 from itertools import islice
 
 import numpy as np
 
-from engine import Model, Spec, build_model
+from engine import Constraints, Model, Spec, box_mesh, build_model
+from engine.assembly import Sides
+from engine.spec import Box, Domain, Layer, MeshOptions
 
 from .plan import Study
 from .run import uplift_over_weight
@@ -41,23 +45,57 @@ def bending_bound(spec: Spec) -> float:
 
 
 def _facts(study: Study, model: Model, workers: int) -> list[tuple[str, str]]:
-    mesh = model.system.mesh
-    steps = sum(round(spec.time.duration / spec.time.dt) for spec in study.cases)
-    marched = sum(
-        max(round(study.cases[i].time.duration / study.cases[i].time.dt) for i in batch.cases) for batch in study.batches
-    )
-    seconds = marched * model.system.n_dof * SECONDS_PER_STEP_AND_DOF / min(workers, len(study.batches))
-    structure = int(mesh.structure.sum())
+    firsts = [study.cases[batch.cases[0]] for batch in study.batches]
+    sizes = [_size(spec.domain, spec.box, spec.layer, spec.mesh, spec.supports.sides) for spec in firsts]
+    structure, joints, ground, unknowns = ([getattr(size, field.name) for size in sizes] for field in fields(_Size))
+    steps = sum(_steps(spec) for spec in study.cases)
     batches = "1 batch" if len(study.batches) == 1 else f"{len(study.batches)} batches"
     return [
-        ("cases", f"{len(study.cases)} in {batches}, {steps:,} case-steps, about {max(seconds, 1):.0f} s"),
+        ("cases", f"{len(study.cases)} in {batches}, {steps:,} case-steps, about {_seconds(study, unknowns, workers):.0f} s"),
         ("axes", ", ".join(f"{axis.name} ({len(axis.values)})" for axis in study.axes) or "none"),
-        ("mesh", f"{structure} structure + {len(mesh.joints)} joint + {len(mesh.triangles) - structure} ground elements"),
-        ("unknowns", f"{model.system.n_dof} degrees of freedom, {len(model.system.points)} joint points"),
+        ("mesh", f"{_range(structure)} structure + {_range(joints)} joint + {_range(ground)} ground elements"),
+        ("unknowns", f"{_range(unknowns)} degrees of freedom, {len(model.system.points)} joint points"),
         ("frequencies", ", ".join(f"{f:.4g}" for f in model.frequencies[:4]) + " Hz (joints closed)"),
-        ("bending bound", f"walls in T3 are at most {bending_bound(model.spec):.2f} times too stiff in bending"),
+        ("bending bound", f"walls in T3 are at most {max(map(bending_bound, study.cases)):.3g} times too stiff in bending"),
         ("uplift / weight", " to ".join(dict.fromkeys(f"{v:.3g}" for v in _uplift_range(study)))),
     ]
+
+
+@dataclass(frozen=True)
+class _Size:
+    """Counts of a mesh: triangles of the structure, joints, triangles of the ground, unknowns."""
+
+    structure: int
+    joints: int
+    ground: int
+    unknowns: int
+
+
+@lru_cache(maxsize=64)
+def _size(domain: Domain, box: Box, layers: tuple[Layer, ...], options: MeshOptions, sides: Sides) -> _Size:
+    mesh = box_mesh(Spec(domain=domain, box=box, layer=layers, mesh=options)).mesh
+    held = Constraints.of_sides(mesh, sides)
+    moves_alone = ~held.fixed & (held.master == np.arange(len(mesh.nodes))[:, None])
+    structure = int(mesh.structure.sum())
+    return _Size(structure, len(mesh.joints), len(mesh.triangles) - structure, int(moves_alone.sum()))
+
+
+def _steps(spec: Spec) -> int:
+    return round(spec.time.duration / spec.time.dt)
+
+
+def _range(counts: list[int]) -> str:
+    low, high = min(counts), max(counts)
+    return f"{low}" if low == high else f"{low} to {high}"
+
+
+def _seconds(study: Study, unknowns: list[int], workers: int) -> float:
+    """About how long the batches take: as long as the longest of them at least."""
+    each = [
+        n * max(_steps(study.cases[i]) for i in batch.cases) * SECONDS_PER_STEP_AND_DOF
+        for n, batch in zip(unknowns, study.batches, strict=True)
+    ]
+    return max(1.0, *each, sum(each) / workers)
 
 
 def _uplift_range(study: Study) -> tuple[float, float]:
@@ -80,9 +118,49 @@ def _warnings(study: Study, model: Model) -> list[str]:
     uplift = _uplift_range(study)[1]
     if uplift > 1:
         found.append(f"the net uplift of the pressure reaches {uplift:.3g} times the box's weight: it leaves its floor")
-    if found_waves := _short_waves(study, model):
-        found.append(found_waves)
-    return found
+    found += [line for line in (_strong_pressure(study), _short_waves(study, model)) if line]
+    return found + list(_implausible_motions(study))
+
+
+CONCRETE = 40e6
+"""[Pa] compressive strength of a strong structural concrete, C40/50 of EN 1992-1-1."""
+
+
+def strip_bending(spec: Spec) -> float:
+    """Largest bending stress [Pa] of roof, floor and walls under the water pressure, each as a clamped strip: p (L/t)²/2."""
+    box = spec.box
+    across, upright = box.width - box.wall, box.height - box.wall
+    spans = ((box.depth, across), (box.depth + box.height, across), (box.depth + box.height / 2, upright))
+    pressures = ((abs(spec.pressure.p0) * depth / spec.pressure.reference_height, span) for depth, span in spans)
+    return max(p * (span / box.wall) ** 2 / 2 for p, span in pressures)
+
+
+def _strong_pressure(study: Study) -> str:
+    """Whether the pressure is more than the box's walls could bear."""
+    worst = max(study.cases, key=strip_bending)
+    if (stress := strip_bending(worst)) <= CONCRETE:
+        return ""
+    load = f"pressure.p0 = {in_words(worst.pressure.p0, 'Pa')}"
+    return (
+        f"{load} bends the walls, taken as clamped strips, to {1e-6 * stress:.0f} MPa; "
+        f"strong concrete bears {1e-6 * CONCRETE:.0f} MPa in compression and a tenth of that in tension"
+    )
+
+
+LARGEST_USUAL, LARGEST_FACTOR = 2 * 9.80665, 4.0
+"""[m/s²] Few records on firm ground reach it. A record scaled by more than the factor stands for another earthquake."""
+
+
+def _implausible_motions(study: Study) -> Iterator[str]:
+    """Motions stronger than records are, and records scaled far up."""
+    motions = {(case.motion, case.time, case.synthetic, case.ricker): i for i, case in enumerate(study.cases)}
+    strongest = max(motions.values(), key=lambda i: np.abs(study.ground(i)).max())
+    peak = float(np.abs(study.ground(strongest)).max())
+    if peak > LARGEST_USUAL:
+        yield f"the motion reaches {peak:.3g} m/s² = {peak / 9.80665:.2g} g; hardly any record on firm ground does"
+    record = study.motions.get(study.cases[strongest].motion.record)
+    if record is not None and (factor := np.abs(study.ground(strongest)[:, 0]).max() / record.peak) > LARGEST_FACTOR:
+        yield f"{record.name} is scaled up {factor:.2g} times; so strong an earthquake lasts longer and has other frequencies"
 
 
 def _rounded_down(value: float) -> float:

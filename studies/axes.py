@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.units import in_si
 
-from .fields import Field, catalogue, nearest, resolve
+from .fields import Field, catalogue, nearest, of_that_name, resolve
 from .messages import shown
 
 MOST_CASES = 1_000_000
@@ -41,11 +41,10 @@ class Axis:
     along: Mapping[str, Along] = field(default_factory=dict)
 
     @classmethod
-    def of_field(cls, name: str, swept: Field, values: list[Any]) -> "Axis":
-        """The axis along which one field takes `values`."""
-        return cls(
-            f"sweep.{swept.name}", name, swept.unit, swept.meaning, tuple(values), tuple({swept.name: value} for value in values)
-        )
+    def of_field(cls, key: str, swept: Field, values: list[Any]) -> "Axis":
+        """The axis along which the field that a `key` of [sweep] names takes `values`."""
+        settings = tuple({swept.name: value} for value in values)
+        return cls(f"sweep.{key}", key.replace(".", "_"), swept.unit, swept.meaning, tuple(values), settings)
 
 
 def swept_axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
@@ -57,17 +56,25 @@ def swept_axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
     for name, written in _flat(sweep).items():
         field = resolve(name)
         if field is None:
-            known = [other.name for other in catalogue()]
-            mistakes.append(f"sweep.{name}: is not a field{nearest(name, known)}")
+            mistakes.append(f"sweep.{name}: {_no_field(name)}")
+        elif not field.single:
+            mistakes.append(f"sweep.{name}: holds several values and cannot be swept; write a study for each")
         elif field.name in axes:
             mistakes.append(f"sweep.{name}: {field.name} is swept already")
         else:
             values = _values(f"sweep.{name}", written, field, mistakes)
-            axes[field.name] = Axis.of_field(name.replace(".", "_"), field, values)
+            axes[field.name] = Axis.of_field(name, field, values)
     if (count := prod(len(axis.values) for axis in axes.values())) > MOST_CASES:
         mistakes.append(f"sweep: makes {count:,} cases; must be at most {MOST_CASES:,}")
         return []
     return list(axes.values())
+
+
+def _no_field(name: str) -> str:
+    """Why a key of [sweep] names no field."""
+    if len(several := of_that_name(name)) > 1:
+        return f"is the name of several fields; write {' or '.join(several)}"
+    return f"is not a field{nearest(name, [field.name for field in catalogue()])}"
 
 
 _RANGE = {"from", "to", "num", "spacing"}

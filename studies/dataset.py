@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from engine import Model, Response, Status
+from engine import PERIODS, Model, Response, Status
 from engine.simulate import OPENING, PENETRATION, PRESSURE, SLIP
 
 from .axes import Along
@@ -22,12 +22,28 @@ from .plan import Study
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable: dimensions after the study's axes, unit, long name, what it means."""
+    """One variable: dimensions after the study's axes, unit, long name, what it means.
+
+    flags : what its whole numbers stand for, by CF; -1 then marks what is not there
+    of_motion : whether it follows from the motion at the base, so that it carries only the axes along which that changes
+    """
 
     dims: tuple[str, ...]
     unit: str
     long_name: str
     meaning: str = ""
+    flags: tuple[str, ...] = ()
+    of_motion: bool = False
+
+    def attributes(self) -> dict[str, Any]:
+        """As netCDF attributes."""
+        found: dict[str, Any] = _attributes(self.unit, self.long_name, self.meaning)
+        if self.flags:
+            found |= {"flag_values": np.arange(len(self.flags), dtype=np.int8), "flag_meanings": " ".join(self.flags)}
+        return found
+
+
+JOINT_STATES = ("open", "sticking", "slipping_forward", "slipping_backward")
 
 
 SCHEMA: dict[str, Variable] = {
@@ -48,6 +64,7 @@ SCHEMA: dict[str, Variable] = {
     ),
     "open_fraction": Variable(("time",), "1", "share of the joint length that is open", "carries no pressure"),
     "slip_fraction": Variable(("time",), "1", "share of the joint length that slips"),
+    "joint_state": Variable(("time", "joint"), "", "state of the joint points", flags=JOINT_STATES),
     "max_opening": Variable(("joint",), "m", "largest opening of the joint"),
     "max_slip": Variable(("joint",), "m", "largest slip of the joint"),
     "max_pressure": Variable(("joint",), "Pa", "largest contact pressure of the joint"),
@@ -65,8 +82,8 @@ SCHEMA: dict[str, Variable] = {
     "peak_racking_free_field": Variable((), "m", "largest magnitude of the free field's racking"),
     "shape": Variable(("node", "component"), "m", "displacement of all nodes at the moment of the largest racking"),
     "shape_time": Variable((), "s", "moment of the largest racking"),
-    "shape_state": Variable(("joint",), "1", "joint states at that moment", "0 open, 1 sticking, 2 and 3 slipping"),
-    "status": Variable((), "1", "how the case ended", ", ".join(f"{s.value} {s.name.lower().replace('_', ' ')}" for s in Status)),
+    "shape_state": Variable(("joint",), "", "joint states at that moment", flags=JOINT_STATES),
+    "status": Variable((), "", "how the case ended", flags=tuple(status.name.lower() for status in Status)),
     "reason": Variable((), "", "why the case failed"),
     "iterations": Variable((), "1", "largest number of direct joint solves in a step"),
     "residual": Variable((), "1", "largest relative residual of a joint solve"),
@@ -75,8 +92,15 @@ SCHEMA: dict[str, Variable] = {
     "contact_drift": Variable((), "1", "joint work that is neither stored nor dissipated", "shrinks with the time step"),
     "penetration": Variable((), "m", "largest penetration of the penalty joints"),
     "frequency": Variable(("mode",), "Hz", "natural frequencies with all joints closed and sticking"),
-    "base_acceleration": Variable(("time", "component"), "m/s2", "acceleration of the rigid base"),
-    "peak_base_acceleration": Variable(("component",), "m/s2", "largest magnitude of the base acceleration"),
+    "base_acceleration": Variable(("time", "component"), "m/s2", "acceleration of the rigid base", of_motion=True),
+    "peak_base_acceleration": Variable(("component",), "m/s2", "largest magnitude of the base acceleration", of_motion=True),
+    "response_spectrum": Variable(
+        ("period", "component"),
+        "m/s2",
+        "pseudo-acceleration response spectrum of the base acceleration",
+        "damping ratio 0.05",
+        of_motion=True,
+    ),
     "closed_before_shaking": Variable((), "1", "share of the joint length that carries pressure before the shaking"),
     "uplift_over_weight": Variable(
         (), "1", "net uplift of the water pressure over the box's weight", "9.81 m/s² or the study's own"
@@ -85,6 +109,7 @@ SCHEMA: dict[str, Variable] = {
 
 COORDINATES: dict[str, Variable] = {
     "time": Variable(("time",), "s", "time from the start of the motion"),
+    "period": Variable(("period",), "s", "natural period of the oscillator"),
     "point_x": Variable(("point",), "m", "x of the point"),
     "point_y": Variable(("point",), "m", "y of the point, the ground surface is 0"),
     "joint_x": Variable(("joint",), "m", "x of the joint point"),
@@ -115,6 +140,7 @@ def build_dataset(study: Study, models: Sequence[Model], parts: Sequence[dict[st
         point=("point", list(model.system.mesh.probes)),
         component=("component", ["x", "y"]),
         stress_component=("stress_component", ["xx", "yy", "xy"]),
+        period=("period", PERIODS, _attributes("s", COORDINATES["period"].long_name)),
         mode=("mode", np.arange(1, len(model.frequencies) + 1)),
     )
     ds = _with_mesh(ds, study, models, owner)
@@ -143,20 +169,30 @@ def _variable(
     values = [parts[batch][name][lane] for batch, lane in owner]
     if variable.dims[:1] == ("time",):
         values = [_on_grid(v, parts[batch]["time"], grid) for v, (batch, _) in zip(values, owner, strict=True)]
-    if name == "reason":
-        array = np.array([str(v) for v in values], dtype=object)
-    elif name == "status":
-        array = np.array(values, dtype=np.int32)
-    else:
-        array = _stacked([np.asarray(v, dtype=float) for v in values])
+    array = (
+        np.array([str(v) for v in values], dtype=object) if name == "reason" else _stacked([_typed(variable, v) for v in values])
+    )
+    axes: tuple[str, ...] = tuple(axis.name for axis in study.axes)
     shaped = array.reshape(study.shape + array.shape[1:])
-    dims = (*(axis.name for axis in study.axes), *variable.dims)
-    return xr.Variable(dims, shaped, _attributes(variable.unit, variable.long_name, variable.meaning))
+    if variable.of_motion:
+        axes, shaped = _along_what_changes(study, shaped)
+    return xr.Variable((*axes, *variable.dims), shaped, variable.attributes())
+
+
+def _typed(variable: Variable, values: Any) -> np.ndarray:
+    """Whole numbers for flags, -1 where there is nothing; floats otherwise."""
+    if not variable.flags:
+        return np.asarray(values, dtype=float)
+    found = np.asarray(values, dtype=float)
+    return np.where(np.isnan(found), -1, found).astype(np.int8)
 
 
 def _on_grid(values: np.ndarray, time: np.ndarray, grid: np.ndarray) -> np.ndarray:
     if len(time) == len(grid) and np.array_equal(time, grid):
         return values
+    if values.dtype.kind == "i":
+        last = np.searchsorted(time, grid * (1 + 1e-12), side="right") - 1
+        return np.where((grid <= time[-1] * (1 + 1e-12))[:, None], values[last], -1)
     flat = values.reshape(len(time), -1)
     columns = [np.interp(grid, time, column, right=np.nan) for column in flat.T]
     return np.array(columns).T.reshape(len(grid), *values.shape[1:])
@@ -188,6 +224,7 @@ def case_arrays(model: Model, response: Response, extra: dict[str, np.ndarray]) 
         "racking_shear": r.values[..., recorder.racking + 1],
         "open_fraction": r.fractions[..., 0],
         "slip_fraction": r.fractions[..., 1],
+        "joint_state": r.states,
         "max_opening": r.joint_peaks[:, OPENING],
         "max_slip": r.joint_peaks[:, SLIP],
         "max_pressure": r.joint_peaks[:, PRESSURE],
@@ -295,16 +332,19 @@ def _varying(study: Study, values: list[np.ndarray], owner: np.ndarray) -> tuple
     if all(value.shape == values[0].shape and (value == values[0]).all() for value in values):
         return (), values[0]
     padded = _stacked(values)
-    all_cases = padded[owner[:, 0]].reshape(study.shape + padded.shape[1:])
+    return _along_what_changes(study, padded[owner[:, 0]].reshape(study.shape + padded.shape[1:]))
+
+
+def _along_what_changes(study: Study, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+    """The axes along which values (axes, …) change, and the values along those alone."""
     names: list[str] = []
     for axis in study.axes:
-        first = np.take(all_cases, [0], axis=len(names))
-        same = (all_cases == first) | ((all_cases != all_cases) & (first != first))
-        if same.all():
-            all_cases = np.take(all_cases, 0, axis=len(names))
+        first = np.take(values, [0], axis=len(names))
+        if ((values == first) | ((values != values) & (first != first))).all():
+            values = np.take(values, 0, axis=len(names))
         else:
             names.append(axis.name)
-    return tuple(names), all_cases
+    return tuple(names), values
 
 
 def _facts(variable: Variable) -> tuple[str, str, str]:

@@ -23,11 +23,17 @@ _AT = {
 """Where each measure but the first stands in the dataset. Section stresses are those along the member, at its outer face."""
 
 
+LEAST_ORDER, HIGHEST_ORDER = 0.5, 2.0
+"""Of the observed orders. A displacement under a net force grows like ln R for ever: its order is zero, on a mesh a little more;
+the slowest true one is 1. Errors of statics fall with R^-2 (case 03); a higher order is a turn of the curve, not its end."""
+
+
 @dataclass(frozen=True)
 class Convergence:
     """Of every size k, in the shape of the values; NaN where it cannot be said (order and error: not certified).
 
-    epsilon : |m_k - m_(k-1)|/|m_k|; order : p, from this size and the two before; remaining_error : epsilon/(factor^p - 1)
+    epsilon : |m_k - m_(k-1)|/|m_k|; order : p, from this size and the two before
+    remaining_error : epsilon/(factor^p - 1), with p no larger than the order of statics
     """
 
     epsilon: np.ndarray
@@ -38,7 +44,7 @@ class Convergence:
 def convergence(values: np.ndarray, factor: float) -> Convergence:
     """Change, observed order and remaining error of measures (n_size, …) while the size grows by `factor` (D12).
 
-    Where a measure oscillates or its changes do not shrink there is no order, and no error is certified.
+    Where a measure oscillates or its changes hardly shrink there is no order, and no error is certified.
     """
     m = np.asarray(values, dtype=float)
     change = np.diff(m, axis=0)
@@ -46,8 +52,8 @@ def convergence(values: np.ndarray, factor: float) -> Convergence:
     with np.errstate(divide="ignore", invalid="ignore"):
         epsilon[1:] = np.abs(change) / np.abs(m[1:])
         observed = np.log(change[:-1] / change[1:]) / np.log(factor)
-        order[2:] = np.where((observed > 0) & np.isfinite(observed), observed, np.nan)
-        return Convergence(epsilon, order, epsilon / (factor**order - 1))
+        order[2:] = np.where((observed >= LEAST_ORDER) & np.isfinite(observed), observed, np.nan)
+        return Convergence(epsilon, order, epsilon / (factor ** np.minimum(order, HIGHEST_ORDER) - 1))
 
 
 def is_domain_size(ds: xr.Dataset) -> bool:

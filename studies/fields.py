@@ -1,7 +1,8 @@
 """The fields of a study file: their names, units, rules and meanings, read off the engine's descriptions."""
 
 import difflib
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -10,13 +11,14 @@ from engine.spec import Layer, Section, Spec
 
 @dataclass(frozen=True)
 class Field:
-    """One field: dotted name, unit ("" where it has none), rule, default as text, meaning. `path` leads to it in a Spec."""
+    """One field: dotted name, unit ("" where it has none), rule, default as text, meaning; whether it holds a single value."""
 
     name: str
     unit: str
     rule: str
     default: str
     meaning: str
+    single: bool = True
 
     @property
     def path(self) -> tuple[str, ...]:
@@ -49,7 +51,8 @@ def _fields(prefix: str, section: type[Section], defaults: Section | None) -> li
 def _field(name: str, schema: dict[str, Any], default: Any) -> Field:
     facts = {**schema, **{key: value for part in schema.get("anyOf", []) for key, value in part.items()}}
     unit = facts.get("unit", "")
-    return Field(name, "" if unit == "1" else unit, _rule(facts), _text(default, unit), facts.get("description", ""))
+    single = not {"array", "object"} & {part.get("type") for part in (schema, *schema.get("anyOf", []))}
+    return Field(name, "" if unit == "1" else unit, _rule(facts), _text(default, unit), facts.get("description", ""), single)
 
 
 _LIMITS = {
@@ -93,12 +96,16 @@ def nearest(name: str, known: list[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
+def of_that_name(name: str) -> list[str]:
+    """Dotted names of all fields whose last part is `name`."""
+    return [field.name for field in catalogue() if field.label == name]
+
+
 def resolve(name: str) -> Field | None:
     """The field that a key of [sweep] names: dotted (layer.2.E), with underscores (damping_ratio), or its last part if unique."""
-    parts = name.split(".")
-    if len(parts) == 3 and parts[0] == "layer" and parts[1].isdigit():
-        general = next((field for field in catalogue() if field.name == f"layer.N.{parts[2]}"), None)
-        return None if general is None else Field(name, general.unit, general.rule, general.default, general.meaning)
+    if match := re.fullmatch(r"layer([._])([0-9]+)\1(\w+)", name):
+        general = next((field for field in catalogue() if field.name == f"layer.N.{match[3]}"), None)
+        return None if general is None else replace(general, name=f"layer.{match[2]}.{match[3]}")
     same_leaf = []
     for field in catalogue():
         if field.path[0] != "layer" and name in (field.name, field.name.replace(".", "_")):

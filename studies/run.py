@@ -7,13 +7,26 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from multiprocessing import active_children, get_context
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from engine import MeshError, Model, Spec, Status, build_model, carried_down, free_field, simulate_cases
+from engine import (
+    MeshError,
+    Model,
+    Spec,
+    Status,
+    Trace,
+    build_model,
+    carried_down,
+    compile_kernels,
+    free_field,
+    response_spectrum,
+    simulate_cases,
+)
 
 from .dataset import build_dataset, case_arrays
 from .domain_size import with_convergence
@@ -88,6 +101,7 @@ def _outcomes(study: Study, workers: int, progress: Progress) -> Iterator[tuple[
         for i, job in jobs.items():
             yield i, _guarded(*job, progress)
         return
+    compile_kernels()  # once, not in every process
     with _one_thread():
         left = dict(jobs)
         for i, outcome in _in_pool(jobs, min(workers, len(jobs))):
@@ -157,7 +171,7 @@ def _one_thread() -> Iterator[None]:
 def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress | None = None) -> Outcome:
     """March one batch with its free field, and gather what the dataset holds of it."""
     model = build_model(specs[0])
-    depths = [spec.motion.reference_depth or spec.domain.depth for spec in specs]
+    depths = [_depth_of_the_record(spec) for spec in specs]
     motions = [_at_the_base(model, motion, depth) for motion, depth in zip(motions, depths, strict=True)]
     told = 0
 
@@ -181,9 +195,29 @@ def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress |
         "reference_displacement": field.reference,
         "base_acceleration": base,
         "peak_base_acceleration": np.array([np.abs(motion).max(axis=0) for motion in motions]),
+        "response_spectrum": np.array([_spectrum(motion.tobytes(), model.spec.time.dt) for motion in motions]),
         "uplift_over_weight": np.array([uplift_over_weight(spec) for spec in specs]),
     }
     return Outcome(model, case_arrays(model, response, extra))
+
+
+def trace_case(study: Study, case: int, tell: Callable[[Trace, Model], None]) -> tuple[Status, str]:
+    """March one case by itself and tell every step of it; how it ended, and why where it failed."""
+    spec = study.cases[case]
+    model = build_model(spec)
+    motion = _at_the_base(model, study.ground(case), _depth_of_the_record(spec))
+    response = simulate_cases(model, [spec], [motion], trace=lambda step: tell(step, model))
+    return Status(response.status[0]), response.reason[0]
+
+
+@lru_cache(maxsize=64)
+def _spectrum(motion: bytes, dt: float) -> np.ndarray:
+    """Response spectrum (n_period, 2) of a base motion; most cases of a study share theirs with others."""
+    return response_spectrum(np.frombuffer(motion).reshape(-1, 2), dt)
+
+
+def _depth_of_the_record(spec: Spec) -> float:
+    return spec.motion.reference_depth or spec.domain.depth
 
 
 def _at_the_base(model: Model, motion: np.ndarray, depth: float) -> np.ndarray:

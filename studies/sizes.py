@@ -29,12 +29,12 @@ moves down with the base, and that does not converge."""
 
 
 class Growth(Section):
-    """Sizes that grow by a constant factor."""
+    """Sizes that grow by a constant factor. Below 1.25 the cut of the outermost elements would drown the changes (case 03)."""
 
     model_config = ConfigDict(populate_by_name=True)
 
     start: Quantity("m", "first size", gt=0) = Field(alias="from")
-    factor: Quantity("1", "each size over the one before", gt=1, le=4) = 1.25
+    factor: Quantity("1", "each size over the one before", ge=1.25, le=4) = 1.25
     num: Annotated[int, Field(strict=True, ge=3, le=50, description="how many sizes")]
 
     def sizes(self) -> list[float]:

@@ -48,6 +48,17 @@ def test_what_does_not_converge_is_not_certified(m):
     assert np.isnan(got.remaining_error).all()
 
 
+@pytest.mark.parametrize(("p", "counts_as"), [(0.4, None), (0.6, 0.6), (2.0, 2.0), (5.0, 2.0)])
+def test_slow_orders_are_not_certified_and_fast_ones_count_as_two(p, counts_as):
+    """A turn of the curve looks like a high order; a displacement under a net force like a low one (case 03)."""
+    got = convergence(3 + WIDTHS**-p, Q)
+    if counts_as is None:
+        assert np.isnan(got.remaining_error).all()
+    else:
+        np.testing.assert_allclose(got.order[2:], p, rtol=1e-6)
+        np.testing.assert_allclose(got.remaining_error[2:] / got.epsilon[2:], 1 / (Q**counts_as - 1), rtol=1e-5)
+
+
 def test_measures_are_judged_one_by_one():
     good, bad = 3 + 1 / WIDTHS**2, np.arange(6.0)
     both = convergence(np.column_stack([good, bad]), Q)
@@ -191,7 +202,7 @@ def test_the_record_at_the_base_and_at_its_depth_march_in_one_batch():
         ({}, "domain_size: must have width or depth"),
         (7, "domain_size = 7: must be a table"),
         ({"width": {"from": "12.8 m", "num": 2}}, "domain_size.width.num = 2: must be 3 or more"),
-        ({"width": {"from": "12.8 m", "num": 4, "factor": 1}}, "domain_size.width.factor = 1: must be greater than 1"),
+        ({"width": {"from": "12.8 m", "num": 4, "factor": 1.1}}, "domain_size.width.factor = 1.1: must be 1.25 or more"),
         ({"width": {"from": 12.8, "num": 4}}, 'domain_size.width.from = 12.8: needs a unit, as in "12.8 m"'),
         ({"width": {"num": 4}}, "domain_size.width.from: is missing"),
         ({"width": {"from": "12.8 m", "num": 4}, "tolerance": 2}, "domain_size.tolerance = 2: must be less than 1"),

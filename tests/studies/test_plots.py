@@ -12,19 +12,11 @@ from matplotlib.image import imread
 from matplotlib.text import Text
 
 from studies import run_study, write_dataset
-from studies.plots import (
-    JOINT_COLOURS,
-    JOINT_STATES,
-    STYLE,
-    WIDTH,
-    _shown,
-    deformed_figure,
-    draw_all,
-    history_figure,
-    mesh_figure,
-    peaks_figure,
-    record_figure,
-)
+from studies.plots import _shown, draw_all
+from studies.plots.box import deformed_figure, mesh_figure
+from studies.plots.motion import history_figure, record_figure
+from studies.plots.style import JOINT_COLOURS, JOINT_STATES, STYLE, WIDTH
+from studies.plots.sweeps import peaks_figure
 from studies.table import cases_of
 
 from .conftest import COARSE, SHORT, study_of

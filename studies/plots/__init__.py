@@ -1,0 +1,62 @@
+"""Figures of a dataset, 180 mm wide, legible in grey."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from engine import Status
+
+from ..domain_size import is_domain_size
+from ..table import axes_of, cases_of, in_words
+from .box import deformed_figure, mesh_figure
+from .contact import contact_figure
+from .convergence import convergence_figure
+from .motion import history_figure, record_figure
+from .style import STYLE, symbol
+from .sweeps import GRID_QUANTITIES, grid_figure, peaks_figure
+
+__all__ = ["draw_all"]
+
+
+def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
+    """Draw every figure that the dataset allows beside `path`; the files drawn are returned."""
+    done = cases_of(ds)
+    done = done.isel(case=np.flatnonzero(done["status"].values <= Status.SUBSTEPS))
+    drawings: dict[str, Callable[[], Figure]] = {"mesh": lambda: mesh_figure(cases_of(ds).isel(case=0))}
+    if done.sizes["case"]:
+        axes = axes_of(ds)
+        shown = _shown(done, axes)
+        drawings |= {
+            "record": lambda: record_figure(done),
+            "history": lambda: history_figure(done, shown),
+            "deformed": lambda: deformed_figure(done, shown),
+        }
+        if "joint_state" in ds and ds.sizes["joint"]:
+            drawings["contact"] = lambda: contact_figure(done, shown)
+        if len(axes) > 1 and all(ds[axis].dtype.kind in "fi" for axis in axes):
+            for quantity in GRID_QUANTITIES:
+                drawings[f"sweep-{quantity}"] = partial(grid_figure, ds, quantity)
+        if len(axes) == 1 and done[axes[0]].dtype.kind in "fi" and done.sizes["case"] > 2:
+            drawings["peaks"] = lambda: peaks_figure(done, axes[0])
+        if is_domain_size(ds):
+            drawings["convergence"] = lambda: convergence_figure(ds)
+    files = []
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        for name, draw in drawings.items():
+            file = path.with_name(f"{path.stem}-{name}.png")
+            draw().savefig(file)
+            files.append(file)
+    return files
+
+
+def _shown(cases: xr.Dataset, axes: list[str]) -> dict[int, str]:
+    """Up to three cases to show side by side (first, middle, last), with their labels."""
+    n = cases.sizes["case"]
+    chosen = sorted({0, n // 2, n - 1})
+    labels = {i: [f"{symbol(a)} = {in_words(cases[a].values[i], cases[a].attrs['units'])}" for a in axes] for i in chosen}
+    return {i: ",\n".join(", ".join(parts[k : k + 2]) for k in range(0, len(parts), 2)) for i, parts in labels.items()}
