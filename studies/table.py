@@ -56,7 +56,7 @@ def failures(ds: xr.Dataset) -> list[str]:
     axes = axes_of(ds)
     lines = []
     for i in np.flatnonzero(cases["status"].values >= Status.NOT_CONVERGED):
-        place = ", ".join(f"{axis} = {in_words(cases[axis].values[i], cases[axis].attrs['units'])}" for axis in axes)
+        place = _place(cases, axes, i)
         lines.append(f"{place or 'the case'}: {cases['reason'].values[i]}")
     return lines
 
@@ -96,7 +96,13 @@ def _at(cases: xr.Dataset, axes: list[str], i: int) -> str:
     """' at p0 = 2 MPa', or nothing where the study is a single case."""
     if not axes:
         return ""
-    return " at " + ", ".join(f"{axis} = {in_words(cases[axis].values[i], cases[axis].attrs['units'])}" for axis in axes)
+    return f" at {_place(cases, axes, i)}"
+
+
+def _place(cases: xr.Dataset, axes: list[str], i: int) -> str:
+    """Where in the sweep: 'p0 = 2 MPa, scale = 0.5'; the sizes of a domain speak for themselves."""
+    words = {axis: in_words(cases[axis].values[i], cases[axis].attrs["units"]) for axis in axes}
+    return ", ".join(word if axis == "domain" else f"{axis} = {word}" for axis, word in words.items())
 
 
 def _before_shaking(cases: xr.Dataset, axes: list[str]) -> str:
