@@ -24,6 +24,7 @@ from .messages import StudyError
 from .plan import Study, load_study, shipped_studies
 from .run import run_study, trace_case, write_dataset
 from .show import TRACE_HEAD, show_lines, trace_line
+from .sizes import MEASURES
 from .table import axes_of, failures, sentences
 from .table import table as table_of
 
@@ -322,6 +323,11 @@ def _schema_lines() -> Iterator[str]:
     yield "\n[sweep]                        # a grid of any of these"
     yield 'p0 = [0, "1 MPa", { from = "2 MPa", to = "4 MPa", num = 3, spacing = "linear" }]    # or "log"'
     yield "# a key is the dotted name (pressure.p0), with underscores (damping_ratio), or its last part where unique (p0)"
+    yield "\n[domain_size]                  # or this instead of [sweep]: the iterative boundary method"
+    yield 'width = { from = "12.8 m", factor = 1.25, num = 6 }    # factor ≥ 1.25, num from 3 to 50'
+    yield 'depth = { from = "14 m", factor = 1.25, num = 5 }      # at the last width; the record stays at the depth of [domain]'
+    yield "tolerance = 0.0216             # change at which the method stops; > 0, < 1"
+    yield f'measure = "{MEASURES[0]}"           # {" | ".join(MEASURES)}'
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ def failures(ds: xr.Dataset) -> list[str]:
     axes = axes_of(ds)
     lines = []
     for i in np.flatnonzero(cases["status"].values >= Status.NOT_CONVERGED):
-        place = _place(cases, axes, i)
+        place = _place(cases, axes, int(i))
         lines.append(f"{place or 'the case'}: {cases['reason'].values[i]}")
     return lines
 
