@@ -1,13 +1,17 @@
-# Everything a user or a CI types. Works from a bare clone with Python >= 3.11 and make.
+# Everything a user or a CI types. Works from a bare clone with Python and GNU make 3.81 or newer.
 
-PYTHON ?= $(shell for p in python3.14 python3.13 python3.12 python3.11 python3 python; do \
-	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
-BIN := .venv/bin
+NEEDED := Python 3.11 to 3.14 (on Intel Macs to 3.13)
+FITS := import platform, sys; top = 13 if (sys.platform, platform.machine()) == ('darwin', 'x86_64') else 14; \
+	sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, top))
+PYTHON ?= $(shell for p in python3.14 python3.13 python3.12 python3.11 python3 python py; do \
+	command -v $$p >/dev/null 2>&1 && $$p -c "$(FITS)" >/dev/null 2>&1 && echo $$p && break; done)
+NO_VENV = import sys; print('$(PYTHON) has no venv module; on Debian and Ubuntu: apt install python%d.%d-venv' % sys.version_info[:2])
+BIN := $(if $(filter Windows_NT,$(OS)),.venv/Scripts,.venv/bin)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 STUDY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help install study test verify check clean
+.PHONY: help install study test verify check check-platforms clean
 
 help: ## list the targets
 	@echo "make study              run all named studies, from nothing; results and figures in results/"
@@ -15,21 +19,23 @@ help: ## list the targets
 	@echo "make test               run the tests"
 	@echo "make verify             run the verification cases alone, with their names"
 	@echo "make check              style, format, import contract, types"
-	@echo "make install            make .venv with the command .venv/bin/coralquake"
+	@echo "make check-platforms    do the pinned versions have wheels on every platform and Python? installs nothing"
+	@echo "make install            make .venv with the command $(BIN)/coralquake"
 	@echo "make clean              remove .venv, caches and what studies wrote to results/"
 
 .venv/made:
-	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed and was not found; install it, or say: make PYTHON=/path/to/python"; exit 2; }
-	@$(PYTHON) -c "import ensurepip, venv" 2>/dev/null || { echo "$(PYTHON) has no venv module; on Debian and Ubuntu: apt install python3-venv"; exit 2; }
-	$(PYTHON) -m venv .venv
+	@test -n "$(PYTHON)" || { echo "$(NEEDED) was not found; install it, or say: make PYTHON=/path/to/python"; exit 2; }
+	@"$(PYTHON)" -c "$(FITS)" || { echo "$(PYTHON) is not $(NEEDED)"; exit 2; }
+	@"$(PYTHON)" -c "import ensurepip, venv" 2>/dev/null || { "$(PYTHON)" -c "$(NO_VENV)"; exit 2; }
+	"$(PYTHON)" -m venv .venv
 	@touch $@
 
 .venv/installed: .venv/made pyproject.toml pins.txt
-	$(PIP) install --quiet --constraint pins.txt --editable .
+	$(PIP) install --quiet --only-binary :all: --constraint pins.txt --editable .
 	@touch $@
 
 .venv/tools: .venv/installed
-	$(PIP) install --quiet --constraint pins.txt --editable ".[dev]"
+	$(PIP) install --quiet --only-binary :all: --constraint pins.txt --editable ".[dev]"
 	@touch $@
 
 install: .venv/installed
@@ -49,6 +55,9 @@ check: .venv/tools
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	$(BIN)/mypy
+
+check-platforms: .venv/tools
+	@sh .ci/check-platforms $(BIN)/python
 
 clean:
 	rm -rf .venv build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis

@@ -11,9 +11,9 @@ import xarray as xr
 import studies
 from engine import Status, build_model
 from studies import run_study, write_dataset
-from studies.run import ONE_THREAD, run_batch, uplift_over_weight
+from studies.run import ONE_THREAD, run_batch, trace_case, uplift_over_weight
 
-from .conftest import QUICK, SHORT, study_of
+from .conftest import FAILING, QUICK, SHORT, study_of
 
 TWO_BATCHES = f'{SHORT}[sweep]\np0 = [0, "0.2 MPa", "4 MPa"]\ndamping_ratio = [0.02, 0.05]\n'
 
@@ -27,7 +27,7 @@ def assert_same_bits(left, right):
     for name in left.variables:
         assert left[name].dims == right[name].dims
         np.testing.assert_array_equal(left[name].values, right[name].values, err_msg=name)
-        assert left[name].attrs == right[name].attrs
+        np.testing.assert_equal(dict(left[name].attrs), dict(right[name].attrs), err_msg=name)
     moving = ("created", "history")
     assert {k: v for k, v in left.attrs.items() if k not in moving} == {k: v for k, v in right.attrs.items() if k not in moving}
 
@@ -43,6 +43,19 @@ def test_two_processes_give_the_bits_of_one():
     assert dict(os.environ) == environment
 
 
+def test_kernels_are_compiled_before_processes_start(monkeypatch):
+    done = []
+
+    def in_pool(jobs, workers):
+        done.append("pool")
+        return ((i, RUNNER._guarded(*job)) for i, job in jobs.items())
+
+    monkeypatch.setattr(RUNNER, "compile_kernels", lambda: done.append("compiled"))
+    monkeypatch.setattr(RUNNER, "_in_pool", in_pool)
+    run_study(study_of(TWO_BATCHES), workers=2)
+    assert done == ["compiled", "pool"]
+
+
 def test_a_second_run_gives_the_same_bits(quick, quick_ds):
     assert_same_bits(quick_ds, run_study(quick, workers=1))
 
@@ -51,8 +64,9 @@ def test_a_second_run_gives_the_same_bits(quick, quick_ds):
 def test_a_case_alone_gives_the_bits_of_the_case_in_company(case, quick, quick_ds):
     outcome = run_batch([quick.cases[case]], [quick.ground(case)])
     for name, values in outcome.arrays.items():
-        if name in quick_ds and values.dtype.kind == "f" and name != "time":
-            np.testing.assert_array_equal(values[0], quick_ds[name].values[case], err_msg=name)
+        if name in quick_ds and values.dtype.kind in "fi" and name != "time":
+            here = quick_ds[name].isel(p0=case) if "p0" in quick_ds[name].dims else quick_ds[name]
+            np.testing.assert_array_equal(values[0], here.values, err_msg=name)
 
 
 def test_progress_counts_every_step_of_every_case(quick):
@@ -101,6 +115,54 @@ def test_uplift_is_the_resultant_of_the_pressure_over_the_weight(box):
     weight = (spec.box.width * spec.box.height - inner) * spec.box.density * spec.gravity.acceleration
     # linear pressure on straight edges is integrated exactly; the tolerance is that of a sum of a few forces
     assert uplift_over_weight(spec) == pytest.approx(vertical @ model.pressure(spec) / weight, rel=1e-12)
+
+
+# step by step ----------------------------------------------------------------------------------------------------------------
+
+
+def traced(study, case):
+    """How the case ended, and what was told of every step."""
+    told = []
+    ended = trace_case(study, case, lambda step, model: told.append((step, model)))
+    return ended, told
+
+
+@pytest.mark.parametrize("case", range(4))
+def test_trace_tells_the_case_of_the_run(case, quick, quick_ds):
+    """Bit by bit, also of the steps that the run does not keep: counts at the kept ones, largest values over all."""
+    (status, reason), told = traced(quick, case)
+    assert (status, reason) == (Status.DONE, "")
+    assert [step.step for step, _ in told] == list(range(41))
+    here = quick_ds.isel(p0=case)
+    np.testing.assert_array_equal([step.states for step, _ in told[::2]], here["joint_state"])
+    np.testing.assert_array_equal([step.time for step, _ in told[::2]], here["time"])
+    assert max(step.rounds for step, _ in told) == here["iterations"]
+    assert max(step.residual for step, _ in told) == here["residual"]
+
+
+def test_trace_takes_the_motion_down_to_a_deeper_base():
+    study = study_of(SHORT.replace("[mesh]", 'reference_depth = "14 m"\n[mesh]') + '[sweep]\ndomain_depth = ["14 m", "20 m"]\n')
+    ds = run_study(study, workers=1)
+    for case in range(2):
+        _, told = traced(study, case)
+        np.testing.assert_array_equal([step.states for step, _ in told[::2]], ds["joint_state"][case])
+        assert max(step.residual for step, _ in told) == ds["residual"][case]
+    assert (ds["joint_state"][0] != ds["joint_state"][1]).any()  # the cases differ
+
+
+def test_trace_says_why_a_case_failed(failing_ds):
+    (status, reason), told = traced(study_of(FAILING), 1)
+    assert status == Status.NO_EQUILIBRIUM == failing_ds["status"][1]
+    assert reason == failing_ds["reason"][1]
+    assert len(told) <= 1  # no step of the march
+
+
+def test_trace_knows_the_case_s_own_model():
+    study = study_of(f'{SHORT}[sweep]\ndt = ["10 ms", "5 ms"]')
+    for case, dt in enumerate((0.01, 0.005)):
+        _, told = traced(study, case)
+        assert {model.spec.time.dt for _, model in told} == {dt}
+        assert told[-1][0].time == pytest.approx(0.4, rel=1e-14)
 
 
 # lost batches ----------------------------------------------------------------------------------------------------------------
@@ -170,4 +232,4 @@ def test_a_failed_write_leaves_the_file_of_before(quick_ds, tmp_path, monkeypatc
 def test_histories_are_compressed(quick_file):
     with xr.open_dataset(quick_file) as ds:
         assert ds["displacement"].encoding["zlib"] is True
-        assert ds["status"].dtype == np.int32
+        assert ds["status"].dtype == np.int8

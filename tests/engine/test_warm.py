@@ -1,0 +1,52 @@
+"""Kernels are compiled before processes start: what the runner calls afterwards is compiled already."""
+
+import subprocess
+import sys
+
+import numba
+import pytest
+
+CHECK = """
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from engine import Spec, build_model, compile_kernels, free_field, simulate_cases
+from engine.kernels import dense, joint, march, sparse, states, triangle
+from engine.warm import COARSE
+
+def compiled():
+    kernels = (x for m in (dense, joint, march, sparse, states, triangle) for x in vars(m).values() if isinstance(x, Dispatcher))
+    return {kernel.__qualname__: len(kernel.signatures) for kernel in kernels if kernel.signatures}
+
+print(len(compiled()))
+compile_kernels()
+first = compiled()
+print(len(first))
+for change in CHANGES:
+    tree = COARSE.model_dump()
+    for table, values in change.items():
+        tree[table] |= values
+    spec = Spec.model_validate(tree)
+    model = build_model(spec)
+    motion = np.zeros((30, 2))
+    motion[1:, :] = [20.0, -8.0]
+    simulate_cases(model, [spec] * 3, [motion] * 3)
+    free_field(model, [motion] * 3)
+    assert compiled() == first, (change, first, compiled())
+"""
+
+CHANGES = [
+    {},
+    {"damping": {"joints": True}},
+    {"joint": {"quadrature": "one-point"}},
+    {"mesh": {"mass": "lumped"}, "supports": {"sides": "roller"}},
+    {"pressure": {"p0": 0.0}, "gravity": {"self_weight": False}, "output": {"every": 5}},
+]
+"""What a study can vary in the calls of kernels; `motion` is strong enough to open the joint."""
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs compiled kernels")
+def test_a_batch_calls_no_kernel_in_a_form_that_was_not_compiled():
+    done = subprocess.run([sys.executable, "-c", f"CHANGES = {CHANGES}\n{CHECK}"], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    before, after = map(int, done.stdout.split())
+    assert before == 0 < after
