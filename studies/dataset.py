@@ -372,7 +372,9 @@ def _provenance(study: Study) -> dict[str, str]:
 
 def _commit() -> str:
     """Commit of the checkout that the program runs from, 'unknown' elsewhere."""
-    folder = Path(__file__).parent
+    folder = Path(__file__).parents[1]
+    if not (folder / ".git").exists():  # an installed package may lie inside another project's checkout
+        return "unknown"
     try:
         answer = subprocess.run(
             ["git", "-C", str(folder), "rev-parse", "HEAD"], capture_output=True, text=True, timeout=5, check=True
