@@ -118,7 +118,7 @@ def _read_knet(name: str, text: str) -> GroundMotion:
         dt, stated = trace.stats.delta, trace.stats.knet
         maximum, duration = stated.accmax, stated.duration
     except ImportError:
-        raise MotionError(f'{name}: is a K-NET record, which obspy reads: pip install obspy') from None
+        raise MotionError(f"{name}: is a K-NET record, which obspy reads: pip install obspy") from None
     except Exception as error:  # obspy passes on whatever its parser met
         raise MotionError(f"{name}: is not laid out as K-NET records are: {' '.join(str(error).split())}") from None
     if abs(len(trace.data) * dt - duration) > 1:

@@ -111,7 +111,7 @@ def simulate(
     """
     run = _Run(stepper, lanes, every)
     run.settle(static_loads, first_frequency)
-    if trace is not None:
+    if trace is not None and run.alive[0]:
         trace(run.traced(0))
     for step in range(1, len(lanes.ground)):
         report = run.advance(step)

@@ -3,17 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from itertools import islice
 
 import numpy as np
 
 from engine import Constraints, Model, Spec, box_mesh, build_model
 from engine.assembly import Sides
-from engine.spec import Box, Domain, Layer, MeshOptions
+from engine.spec import GENERATED, Box, Domain, Layer, MeshOptions
 
+from .messages import in_words
 from .plan import Study
 from .run import uplift_over_weight
-from .table import in_words
 
 SECONDS_PER_STEP_AND_DOF = 1.2e-6
 """Of a batch, whether it holds one case or nine: measured by `coralquake run p0` and `damping`; for the estimate of `check`."""
@@ -46,8 +45,8 @@ def bending_bound(spec: Spec) -> float:
 
 def _facts(study: Study, model: Model, workers: int) -> list[tuple[str, str]]:
     firsts = [study.cases[batch.cases[0]] for batch in study.batches]
-    sizes = [_size(spec.domain, spec.box, spec.layer, spec.mesh, spec.supports.sides) for spec in firsts]
-    structure, joints, ground, unknowns = ([getattr(size, field.name) for size in sizes] for field in fields(_Size))
+    sizes = [_size_of(spec) for spec in firsts]
+    structure, joints, ground, unknowns = ([getattr(size, field.name) for size in sizes] for field in fields(_Size)[:4])
     steps = sum(_steps(spec) for spec in study.cases)
     batches = "1 batch" if len(study.batches) == 1 else f"{len(study.batches)} batches"
     return [
@@ -58,26 +57,34 @@ def _facts(study: Study, model: Model, workers: int) -> list[tuple[str, str]]:
         ("frequencies", ", ".join(f"{f:.4g}" for f in model.frequencies[:4]) + " Hz (joints closed)"),
         ("bending bound", f"walls in T3 are at most {max(map(bending_bound, study.cases)):.3g} times too stiff in bending"),
         ("uplift / weight", " to ".join(dict.fromkeys(f"{v:.3g}" for v in _uplift_range(study)))),
+        ("results", f"about {in_bytes(results_bytes(study, model))} in memory"),
     ]
 
 
 @dataclass(frozen=True)
 class _Size:
-    """Counts of a mesh: triangles of the structure, joints, triangles of the ground, unknowns."""
+    """Of a mesh: triangles of the structure, joints, triangles of the ground, unknowns; height [m] of each layer's elements."""
 
     structure: int
     joints: int
     ground: int
     unknowns: int
+    heights: tuple[float, ...]
 
 
-@lru_cache(maxsize=64)
+def _size_of(spec: Spec) -> _Size:
+    return _size(spec.domain, spec.box, spec.layer, spec.mesh, spec.supports.sides)
+
+
+@lru_cache(maxsize=1024)
 def _size(domain: Domain, box: Box, layers: tuple[Layer, ...], options: MeshOptions, sides: Sides) -> _Size:
     mesh = box_mesh(Spec(domain=domain, box=box, layer=layers, mesh=options)).mesh
     held = Constraints.of_sides(mesh, sides)
     moves_alone = ~held.fixed & (held.master == np.arange(len(mesh.nodes))[:, None])
     structure = int(mesh.structure.sum())
-    return _Size(structure, len(mesh.joints), len(mesh.triangles) - structure, int(moves_alone.sum()))
+    heights = np.ptp(mesh.nodes[mesh.triangles][:, :, 1], axis=1)
+    highest = tuple(float(heights[mesh.material == i].max(initial=0.0)) for i in range(len(layers)))
+    return _Size(structure, len(mesh.joints), len(mesh.triangles) - structure, int(moves_alone.sum()), highest)
 
 
 def _steps(spec: Spec) -> int:
@@ -96,6 +103,25 @@ def _seconds(study: Study, unknowns: list[int], workers: int) -> float:
         for n, batch in zip(unknowns, study.batches, strict=True)
     ]
     return max(1.0, *each, sum(each) / workers)
+
+
+FLOATS_A_POINT, OTHER_FLOATS = 5, 9
+"""Histories of a case: displacement and stress of a point; racking (3), shares of the joint (2), base and reference (2 each)."""
+
+
+def results_bytes(study: Study, model: Model) -> float:
+    """About how much memory the dataset takes: histories on the common grid, one byte a joint state, and the shapes."""
+    step = max(spec.time.dt * spec.output.every for spec in study.cases)
+    kept = max(spec.time.duration for spec in study.cases) / step + 1
+    points = len(model.system.mesh.probes)
+    history = 8 * (FLOATS_A_POINT * points + OTHER_FLOATS) + len(model.system.points)
+    return len(study.cases) * (kept * history + 16 * len(model.system.mesh.nodes))
+
+
+def in_bytes(count: float) -> str:
+    """'80 kB', '3.2 GB'."""
+    unit, factor = next((u, f) for u, f in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)) if count >= f or u == "kB")
+    return f"{float(f'{count / factor:.2g}'):g} {unit}"
 
 
 def _uplift_range(study: Study) -> tuple[float, float]:
@@ -118,8 +144,14 @@ def _warnings(study: Study, model: Model) -> list[str]:
     uplift = _uplift_range(study)[1]
     if uplift > 1:
         found.append(f"the net uplift of the pressure reaches {uplift:.3g} times the box's weight: it leaves its floor")
-    found += [line for line in (_strong_pressure(study), _short_waves(study, model)) if line]
-    return found + list(_implausible_motions(study))
+    found += [line for line in (_strong_pressure(study), _short_waves(study)) if line]
+    if (needed := results_bytes(study, model)) > MOST_BYTES:
+        found.append(f"the results take about {in_bytes(needed)} of memory; raise output.every, or split the study")
+    return [*found, *_implausible_motions(study), *_without_effect(study)]
+
+
+MOST_BYTES = 4e9
+"""Of results; a laptop holds them twice while they are written."""
 
 
 CONCRETE = 40e6
@@ -169,16 +201,42 @@ def _rounded_down(value: float) -> float:
     return float(f"{np.floor(value / unit) * unit:.2g}")
 
 
-def _short_waves(study: Study, model: Model) -> str:
-    """Whether an element is longer than a sixth of the shortest shear wave that the motion and the step can carry."""
-    mesh, spec = model.system.mesh, model.spec
-    heights = np.ptp(mesh.nodes[mesh.triangles][:, :, 1], axis=1)
-    highest = min([0.25 / spec.time.dt, *(0.25 / m.dt for m in islice(study.motions.values(), 2))])
-    for i, layer in enumerate(spec.layer):
-        inside = mesh.material == i
-        speed = np.sqrt(layer.shear_modulus / layer.rho)
-        if inside.any() and heights[inside].max() > speed / highest / 6:
-            limit = speed / 6 / heights[inside].max()
-            size = in_words(heights[inside].max(), "m")
-            return f"layer {i + 1} has elements {size} high: it carries shear waves up to {limit:.3g} Hz well"
-    return ""
+def _short_waves(study: Study) -> str:
+    """Which layers have an element longer than a sixth of the shortest shear wave that the motion and the step can carry."""
+    found: dict[int, tuple[float, float, float]] = {}
+    for batch in study.batches:
+        spec = study.cases[batch.cases[0]]
+        highest = max(_highest_frequency(study, study.cases[i]) for i in batch.cases)
+        for i, (layer, height) in enumerate(zip(spec.layer, _size_of(spec).heights, strict=True), 1):
+            limit = np.sqrt(layer.shear_modulus / layer.rho) / 6 / height if height else np.inf
+            if limit < highest:
+                found[i] = min(found.get(i, (np.inf, 0.0, 0.0)), (limit, height, highest))
+    if not found:
+        return ""
+    each = [f"layer {i} ({in_words(found[i][1], 'm')} high) carries up to {found[i][0]:.3g} Hz well" for i in sorted(found)]
+    highest = max(wanted for _, _, wanted in found.values())
+    return f"elements are too high for shear waves of the motion's {highest:.3g} Hz: {', '.join(each)}; lower mesh.largest_height"
+
+
+def _highest_frequency(study: Study, spec: Spec) -> float:
+    """[Hz] What the step and the motions of a case can carry: a quarter of their rate, of a wavelet three times its frequency."""
+    rates = {"none": 0.0, "synthetic": 0.25 / spec.synthetic.step, "ricker": 3 * spec.ricker.frequency}
+    rates |= {name: 0.25 / record.dt for name, record in study.motions.items()}
+    return min(0.25 / spec.time.dt, max(rates[spec.motion.record], rates[spec.motion.vertical_record]))
+
+
+def _without_effect(study: Study) -> Iterator[str]:
+    """What is swept or set and changes nothing."""
+    used = {name for spec in study.cases for name in (spec.motion.record, spec.motion.vertical_record)}
+    swept = {name for axis in study.axes for settings in axis.settings for name in settings}
+    for table in GENERATED:
+        if table not in used and (idle := sorted(name for name in swept if name.startswith(f"{table}."))):
+            yield f'{idle[0]} is swept without effect: no motion.record = "{table}"'
+    if used == {"none"} and (idle := sorted(swept & {"motion.peak", "motion.scale", "motion.vertical_peak"})):
+        yield f"{idle[0]} is swept without effect: there is no motion"
+    if all(spec.motion.vertical_record == "none" and spec.motion.vertical_peak is not None for spec in study.cases):
+        yield 'motion.vertical_peak has no effect: motion.vertical_record = "none"'
+    if not set(study.motions) and any(spec.motion.record_dt or spec.motion.record_unit for spec in study.cases):
+        yield "motion.record_dt and motion.record_unit have no effect: no record is read"
+    if "joint.thickness" in swept and all(spec.joint.thickness_ratio is not None for spec in study.cases):
+        yield "joint.thickness is swept without effect: joint.thickness_ratio replaces it"

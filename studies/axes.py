@@ -1,5 +1,7 @@
 """The dimensions of a study: what is swept, and which fields each value sets."""
 
+import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import prod
@@ -10,9 +12,12 @@ import numpy as np
 from engine.units import in_si
 
 from .fields import Field, catalogue, nearest, of_that_name, resolve
-from .messages import shown
+from .messages import shown, table_rule
 
 MOST_CASES = 1_000_000
+
+TAKEN = ("frequency",)
+"""Names of variables of the dataset that are also the last parts of fields: an axis is then called by the whole name."""
 
 
 @dataclass(frozen=True)
@@ -44,13 +49,14 @@ class Axis:
     def of_field(cls, key: str, swept: Field, values: list[Any]) -> "Axis":
         """The axis along which the field that a `key` of [sweep] names takes `values`."""
         settings = tuple({swept.name: value} for value in values)
-        return cls(f"sweep.{key}", key.replace(".", "_"), swept.unit, swept.meaning, tuple(values), settings)
+        name = (swept.name if key in TAKEN else key).replace(".", "_")
+        return cls(f"sweep.{key}", name, swept.unit, swept.meaning, tuple(values), settings)
 
 
 def swept_axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
     """One axis for every key of [sweep]."""
     if not isinstance(sweep, dict):
-        mistakes.append(f"sweep = {shown(sweep)}: must be a table")
+        mistakes.append(f"sweep = {shown(sweep)}: {table_rule('sweep', sweep)}")
         return []
     axes: dict[str, Axis] = {}
     for name, written in _flat(sweep).items():
@@ -73,21 +79,26 @@ def swept_axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
 def _no_field(name: str) -> str:
     """Why a key of [sweep] names no field."""
     if len(several := of_that_name(name)) > 1:
-        return f"is the name of several fields; write {' or '.join(several)}"
-    return f"is not a field{nearest(name, [field.name for field in catalogue()])}"
+        return f"is the name of several fields; write {' or '.join(several).replace('.N.', '.1.')}"
+    known = [field.name for field in catalogue()]
+    table = re.sub(r"^layer[._][0-9N]+$", "layer", name)
+    if of_table := [other for other in known if other.startswith(f"{table}.")]:
+        return f"is a table; name one of its fields, as in {of_table[0].replace('.N.', '.1.')}"
+    return f"is not a field{nearest(name, known)}"
 
 
-_RANGE = {"from", "to", "num", "spacing"}
+_RANGE = ("from", "to", "num", "spacing")
 
 
 def _flat(sweep: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Dotted keys of nested tables; a table with keys of a range is a value."""
+    """Dotted keys of nested tables; a table with keys of a range, or under the name of a field, is a value."""
     flat: dict[str, Any] = {}
     for key, value in sweep.items():
-        if isinstance(value, dict) and value and not _RANGE & value.keys():
-            flat |= _flat(value, f"{prefix}{key}.")
+        name = prefix + key
+        if isinstance(value, dict) and value and value.keys().isdisjoint(_RANGE) and resolve(name) is None:
+            flat |= _flat(value, f"{name}.")
         else:
-            flat[prefix + key] = value
+            flat[name] = value
     return flat
 
 
@@ -100,10 +111,8 @@ def _values(name: str, written: Any, field: Field, mistakes: list[str]) -> list[
     values: list[Any] = []
     for entry in entries:
         values += _range(name, entry, field, mistakes) if isinstance(entry, dict) else _single(name, entry, field, mistakes)
-    for i, value in enumerate(values):
-        if value in values[:i]:
-            mistakes.append(f"{name}: holds {shown(value)} {field.unit} twice".replace("  ", " "))
-            break
+    twice = [value for value, count in Counter(values).items() if count > 1]
+    mistakes += [f"{name}: holds {shown(value)} {field.unit} twice".replace("  ", " ") for value in twice[:1]]
     return values
 
 
@@ -120,10 +129,22 @@ def _single(name: str, entry: Any, field: Field, mistakes: list[str]) -> list[An
         return []
 
 
+def _two_values(field: Field) -> str:
+    """Two values of a field of words, as a study file writes them."""
+    first, second = field.rule.split(" | ")[:2] if field.rule else ("a", "b")
+    return f"{first}, {second}" if first == "true" else f'"{first}", "{second}"'
+
+
 def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) -> list[float]:
     """{ from, to, num, spacing = "linear" or "log" } as values."""
+    if not field.numeric:
+        mistakes.append(f"{name} = {shown(entry)}: a range is of numbers; list the values, as in [{_two_values(field)}]")
+        return []
+    if entry.keys().isdisjoint(_RANGE):
+        mistakes.append(f"{name} = {shown(entry)}: must be {{ from, to, num }}, with spacing where wanted, or a list of values")
+        return []
     before = len(mistakes)
-    for key in sorted(entry.keys() - _RANGE):
+    for key in sorted(entry.keys() - set(_RANGE)):
         mistakes.append(f"{name}.{key}: is not part of a range; must be from, to, num or spacing")
     ends = []
     for key in ("from", "to"):
@@ -139,7 +160,8 @@ def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) 
     if "num" not in entry:
         mistakes.append(f"{name}.num: is missing")
     elif isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= MOST_CASES:
-        mistakes.append(f"{name}.num = {shown(num)}: must be a whole number from 2 to {MOST_CASES:,}")
+        given = repr(num) if isinstance(num, float) and num < 1e6 else shown(num)
+        mistakes.append(f"{name}.num = {given}: must be a whole number from 2 to {MOST_CASES:,}")
     if spacing not in ("linear", "log"):
         mistakes.append(f'{name}.spacing = {shown(spacing)}: must be "linear" or "log"')
     elif spacing == "log" and len(ends) == 2 and not (ends[0] > 0 and ends[1] > 0):

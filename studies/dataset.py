@@ -39,6 +39,7 @@ class Variable:
         """As netCDF attributes."""
         found: dict[str, Any] = _attributes(self.unit, self.long_name, self.meaning)
         if self.flags:
+            found["comment"] = "; ".join(part for part in (self.meaning, "-1: not there") if part)
             found |= {"flag_values": np.arange(len(self.flags), dtype=np.int8), "flag_meanings": " ".join(self.flags)}
         return found
 
@@ -310,7 +311,7 @@ _CONNECTIVITY: tuple[tuple[str, tuple[str, ...], Callable[[Model], Any], dict[st
         "mesh_face_nodes",
         ("face", "corner"),
         lambda m: m.system.mesh.triangles.astype(np.int32),
-        {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
+        {"cf_role": "face_node_connectivity", "start_index": np.int32(0), "long_name": "nodes of the triangle"},
     ),
     (
         "mesh_layer",

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from .messages import in_words
 from .sizes import DEPTH, MEASURES, SOURCE_DEPTH, WIDTH, DomainSizes
-from .table import in_words
 
 SOURCE_SIZE, SOURCE_TOLERANCE = (20.0, 14.0), 0.0216
 """Width and depth [m] at which the source stopped, and its displacement error there."""

@@ -11,7 +11,10 @@ from engine.spec import Layer, Section, Spec
 
 @dataclass(frozen=True)
 class Field:
-    """One field: dotted name, unit ("" where it has none), rule, default as text, meaning; whether it holds a single value."""
+    """One field: dotted name, unit ("" where it has none), rule, default as text, meaning.
+
+    single : whether it holds one value; numeric : whether that is a number
+    """
 
     name: str
     unit: str
@@ -19,6 +22,7 @@ class Field:
     default: str
     meaning: str
     single: bool = True
+    numeric: bool = True
 
     @property
     def path(self) -> tuple[str, ...]:
@@ -51,8 +55,16 @@ def _fields(prefix: str, section: type[Section], defaults: Section | None) -> li
 def _field(name: str, schema: dict[str, Any], default: Any) -> Field:
     facts = {**schema, **{key: value for part in schema.get("anyOf", []) for key, value in part.items()}}
     unit = facts.get("unit", "")
-    single = not {"array", "object"} & {part.get("type") for part in (schema, *schema.get("anyOf", []))}
-    return Field(name, "" if unit == "1" else unit, _rule(facts), _text(default, unit), facts.get("description", ""), single)
+    types = {part.get("type") for part in (schema, *schema.get("anyOf", []))}
+    return Field(
+        name,
+        "" if unit == "1" else unit,
+        _rule(facts),
+        _text(default, unit),
+        facts.get("description", ""),
+        single=not {"array", "object"} & types,
+        numeric=bool({"number", "integer"} & types),
+    )
 
 
 _LIMITS = {
@@ -72,7 +84,8 @@ def _rule(facts: dict[str, Any]) -> str:
         return " | ".join(facts["enum"])
     if facts.get("type") == "boolean":
         return "true | false"
-    limits = [f"{sign} {facts[key]:g}" for key, sign in _LIMITS.items() if key in facts]
+    whole = facts.get("type") == "integer"
+    limits = [f"{sign} {facts[key]:{',' if whole else 'g'}}" for key, sign in _LIMITS.items() if key in facts]
     return ", ".join(limits + (["even"] if facts.get("multipleOf") == 2 else []))
 
 
@@ -87,13 +100,41 @@ def _text(default: Any, unit: str) -> str:
 
 
 def nearest(name: str, known: list[str]) -> str:
-    """' Did you mean x?' where a known name is like this one, otherwise nothing."""
-    leaf = name.rsplit(".", 1)[-1]
-    by_leaf = {other.rsplit(".", 1)[-1]: other for other in reversed(known)}
-    close = [by_leaf[leaf]] if leaf in by_leaf else difflib.get_close_matches(name, known, n=1, cutoff=0.6)
-    if not close:
-        close = [by_leaf[other] for other in difflib.get_close_matches(leaf, list(by_leaf), n=1, cutoff=0.6)]
-    return f"; did you mean {close[0]}?" if close else ""
+    """'; did you mean x?' where a known name is like this one, otherwise nothing. Names of layers hold their number."""
+    general, number = _without_number(name)
+    if general in known and number is None and "layer" not in name:
+        return f"; write {name} without quotes"
+    found = _like(general, known)
+    return f"; did you mean {found.replace('.N.', f'.{number or 1}.')}?" if found else ""
+
+
+def _without_number(name: str) -> tuple[str, str | None]:
+    """layer.2.E and layer_2_E as layer.N.E, and the number."""
+    match = re.fullmatch(r"layer([._])([0-9]+)\1(.+)", name)
+    return (f"layer.N.{match[3]}", match[2]) if match else (name, None)
+
+
+def _like(name: str, known: list[str]) -> str | None:
+    """The known name that `name` stands for: of the same table where it names one, else by all of it, else by its last part."""
+    table, _, leaf = name.rpartition(".")
+    leaves = {other.rpartition(".")[2]: other for other in reversed(known)}
+    within = {other.rpartition(".")[2]: other for other in known if table and other.startswith(f"{table}.")}
+    if within:
+        return _close(leaf, within) or leaves.get(leaf)
+    whole = {other.replace(".", "_"): other for other in known}
+    return leaves.get(leaf) or _close(name.replace(".", "_"), whole) or _close(leaf, leaves)
+
+
+LEAST_LIKE = 0.7
+"""Of two names, for one to be proposed in place of the other; "studies" is like "sides" by 0.67."""
+
+
+def _close(word: str, names: dict[str, str]) -> str | None:
+    """What stands behind the name that is most like `word`, capitals left aside, or that it begins."""
+    lower = {name.lower(): other for name, other in names.items()}
+    like = difflib.get_close_matches(word.lower(), lower, n=1, cutoff=LEAST_LIKE)
+    like += [name for name in lower if len(word) > 2 and name.startswith(word.lower())]
+    return lower[like[0]] if like else None
 
 
 def of_that_name(name: str) -> list[str]:

@@ -17,7 +17,7 @@ from engine.spec import GENERATED, Motion
 
 from .axes import Axis, swept_axes
 from .fields import catalogue, nearest
-from .messages import StudyError, explain, shown
+from .messages import StudyError, explain, in_words, shown
 from .sizes import DomainSizes, domain_axis, read_sizes
 
 SHIPPED = Path(__file__).parent
@@ -54,9 +54,9 @@ class Study:
         return tuple(len(axis.values) for axis in self.axes)
 
     def label(self, case: int) -> str:
-        """The case in words: 'p0 = 2e+06 Pa'."""
+        """The case in words: 'p0 = 2 MPa'."""
         index = np.unravel_index(case, self.shape) if self.axes else ()
-        parts = [f"{axis.name} = {shown(axis.values[i])} {axis.unit}".strip() for axis, i in zip(self.axes, index, strict=True)]
+        parts = [f"{axis.name} = {in_words(axis.values[i], axis.unit)}" for axis, i in zip(self.axes, index, strict=True)]
         return ", ".join(parts) or "the only case"
 
     def ground(self, case: int) -> np.ndarray:

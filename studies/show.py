@@ -7,7 +7,8 @@ import xarray as xr
 
 from engine import Model, Status, Trace
 
-from .table import axes_of, in_words
+from .messages import in_words
+from .table import axes_of
 
 TRACE_HEAD = f"{'step':>7} {'time [s]':>10} {'open':>5} {'stick':>5} {'slip':>5} {'solves':>6} {'residual':>9}"
 
@@ -35,10 +36,10 @@ def show_lines(ds: xr.Dataset) -> Iterator[str]:
     yield f"time       {float(ds['time'][-1]):g} s in {ds.sizes['time']} steps kept"
     yield f"points     {', '.join(_points(ds))}"
     yield ""
-    width = max(len(str(name)) for name in ds.data_vars)
-    for name, variable in ds.data_vars.items():
-        if "long_name" in variable.attrs:
-            yield f"{name:<{width}}  {_described(variable)}"
+    described = {name: v for name, v in [*ds.data_vars.items(), *ds.coords.items()] if "long_name" in v.attrs}
+    width = max(len(str(name)) for name in described)
+    for name, variable in described.items():
+        yield f"{name:<{width}}  {_described(variable)}"
     if attrs["study"]:
         yield ""
         yield "study file"
@@ -66,7 +67,8 @@ def _values(axis: xr.DataArray) -> str:
     words = [in_words(value, axis.attrs["units"]) for value in axis.values]
     if len(words) > MOST_SHOWN:
         words = [*words[: MOST_SHOWN // 2], "…", *words[-MOST_SHOWN // 2 :]]
-    return f"{', '.join(words)} ({axis.size})"
+    between = "; " if any(", " in word for word in words) else ", "
+    return f"{between.join(words)} ({axis.size})"
 
 
 def _points(ds: xr.Dataset) -> list[str]:
@@ -74,15 +76,16 @@ def _points(ds: xr.Dataset) -> list[str]:
     if ds["point_x"].ndim > 1 or ds["point_y"].ndim > 1:
         return [str(name) for name in ds["point"].values]
     places = zip(ds["point"].values, ds["point_x"].values, ds["point_y"].values, strict=True)
-    return [f"{name} ({x:g}, {y:g}) m" for name, x, y in places]
+    return [f"{name} ({x + 0.0:g}, {y + 0.0:g}) m" for name, x, y in places]  # 0, not -0
 
 
 def _described(variable: xr.DataArray) -> str:
     """'(p0, time) [m] displacement relative to the base; static state included'."""
     attrs = variable.attrs
     unit = attrs.get("units", "")
-    text = "; ".join(part for part in (attrs["long_name"], attrs.get("comment", "")) if part)
+    text = attrs["long_name"]
     if "flag_meanings" in attrs:
         pairs = zip(np.atleast_1d(attrs["flag_values"]), attrs["flag_meanings"].split(), strict=True)
         text += ": " + ", ".join(f"{value} {meaning.replace('_', ' ')}" for value, meaning in pairs)
+    text += f"; {attrs['comment']}" if attrs.get("comment") else ""
     return f"({', '.join(map(str, variable.dims))}) {f'[{unit}] ' if unit not in ('', '1') else ''}{text}"

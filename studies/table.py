@@ -6,6 +6,8 @@ import xarray as xr
 
 from engine import Status
 
+from .messages import in_words
+
 
 def axes_of(ds: xr.Dataset) -> list[str]:
     """Names of the swept axes, in the study's order."""
@@ -59,27 +61,6 @@ def failures(ds: xr.Dataset) -> list[str]:
         place = _place(cases, axes, int(i))
         lines.append(f"{place or 'the case'}: {cases['reason'].values[i]}")
     return lines
-
-
-_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
-
-
-def in_words(value: object, unit: str) -> str:
-    """A value with its unit, as a reader would write it: 2 MPa, 0.05."""
-    if isinstance(value, (bool, np.bool_)):
-        return str(bool(value)).lower()
-    if isinstance(value, str):
-        return str(value)
-    number = float(value)  # type: ignore[arg-type]
-    if number == 0.0:
-        return "0"
-    unit = unit.replace("**", "")
-    if unit in ("Pa", "Hz"):
-        for factor, prefix in _PREFIXES:
-            if abs(number) >= 0.01 * factor and abs(number) >= 1e3:
-                return f"{number / factor:.3g} {prefix}{unit}"
-    text = f"{number:.0f}" if 1e3 <= abs(number) < 1e5 and number == round(number) else f"{number:.3g}"
-    return text if unit in ("", "1") else f"{text} {unit}"
 
 
 def sentences(ds: xr.Dataset) -> list[str]:

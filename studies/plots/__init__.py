@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 from engine import Status
 
 from ..domain_size import is_domain_size
-from ..table import axes_of, cases_of, in_words
+from ..messages import in_words
+from ..table import axes_of, cases_of
 from .box import deformed_figure, mesh_figure
 from .contact import contact_figure
 from .convergence import convergence_figure
 from .motion import history_figure, record_figure
-from .style import STYLE, symbol
+from .style import LABEL_WIDTH, STYLE, in_lines, symbol
 from .sweeps import GRID_QUANTITIES, grid_figure, peaks_figure
 
 __all__ = ["draw_all"]
@@ -31,12 +32,12 @@ def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
     if done.sizes["case"]:
         axes = axes_of(ds)
         shown = _shown(done, axes)
-        drawings |= {
-            "record": lambda: record_figure(done),
-            "history": lambda: history_figure(done, shown),
-            "deformed": lambda: deformed_figure(done, shown),
-        }
-        if "joint_state" in ds and ds.sizes["joint"]:
+        marched = ds.sizes["time"] > 1
+        if marched:
+            drawings["record"] = lambda: record_figure(done)
+            drawings["history"] = lambda: history_figure(done, shown)
+        drawings["deformed"] = lambda: deformed_figure(done, shown)
+        if marched and ds.sizes["joint"]:
             drawings["contact"] = lambda: contact_figure(done, shown)
         if len(axes) > 1 and all(ds[axis].dtype.kind in "fi" for axis in axes):
             for quantity in GRID_QUANTITIES:
@@ -58,5 +59,10 @@ def _shown(cases: xr.Dataset, axes: list[str]) -> dict[int, str]:
     """Up to three cases to show side by side (first, middle, last), with their labels."""
     n = cases.sizes["case"]
     chosen = sorted({0, n // 2, n - 1})
-    labels = {i: [f"{symbol(a)} = {in_words(cases[a].values[i], cases[a].attrs['units'])}" for a in axes] for i in chosen}
-    return {i: ",\n".join(", ".join(parts[k : k + 2]) for k in range(0, len(parts), 2)) for i, parts in labels.items()}
+    return {i: in_lines([part for axis in axes for part in _label(cases, axis, i)], LABEL_WIDTH) for i in chosen}
+
+
+def _label(cases: xr.Dataset, axis: str, i: int) -> list[str]:
+    """What a case is along one axis: 'p0 = 2 MPa'; the sizes of a domain speak for themselves."""
+    value = in_words(cases[axis].values[i], cases[axis].attrs["units"])
+    return value.split(", ") if axis == "domain" else [f"{symbol(axis)} = {value}"]

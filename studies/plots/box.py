@@ -66,14 +66,15 @@ def _joint_line(ax: Axes, ds: xr.Dataset, width: float, colour: str) -> None:
 
 
 def deformed_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
-    """The box and the ground round it at the moment of the largest racking, open joints red, slipping ones orange."""
-    fig = Figure(figsize=(WIDTH, 0.82 * WIDTH / len(shown) + 0.85 if len(shown) > 1 else 0.7 * WIDTH))
+    """The box and the ground round it at the moment of the largest racking, its joint in the colours of its states."""
+    lines = max(name.count("\n") for name in shown.values())
+    fig = Figure(figsize=(WIDTH, 0.82 * WIDTH / len(shown) + 0.85 + 0.13 * lines if len(shown) > 1 else 0.7 * WIDTH))
     for i, (case, name) in enumerate(shown.items()):
         ax = fig.add_subplot(1, len(shown), i + 1)
         factor = _deformed(ax, cases.isel(case=case))
         moment = f"t = {float(cases['shape_time'][case]):.2f} s, {'displacements' if len(shown) < 3 else 'u'} × {factor:,.0f}"
         ax.set_title(f"{name}\n{moment}" if name else moment, loc="left", fontsize=7.5)
-        ax.set(aspect="equal", xlabel="x [m]")
+        ax.set(aspect="equal", anchor="S", xlabel="x [m]")
         if i == 0:
             ax.set_ylabel("y [m]")
     handles = joint_handles(partial(Line2D, [], [], lw=2.5))

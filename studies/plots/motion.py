@@ -25,7 +25,8 @@ def record_figure(cases: xr.Dataset) -> Figure:
         history.plot(case["time"], motion, color="black", lw=0.5)
         direction = "horizontal" if component == "x" else "vertical"
         history.set_title(f"{direction} base acceleration, peak {float(peaks.sel(component=component)):.4g} m/s²", loc="left")
-        history.set(ylabel="acceleration [m/s²]", xlim=(0, float(case["time"].where(motion.notnull()).max())))
+        end = float(case["time"].where(motion.notnull()).max()) or float(case["time"][-1])
+        history.set(ylabel="acceleration [m/s²]", xlim=(0, end))
         history.axhline(0, color="0.6", lw=0.5, zorder=0)
         _spectrum(spectrum, case, component)
     panels[-1, 0].set_xlabel("time [s]")
@@ -39,7 +40,7 @@ def _spectrum(ax: Axes, case: xr.Dataset, component: str) -> None:
     ax.semilogx(case["period"], spectrum, color="black")
     ax.set(
         ylabel="spectral acceleration [m/s²]",
-        ylim=(0, 1.4 * float(spectrum.max()) or 1.0),
+        ylim=(0, 1.5 * float(spectrum.max()) or 1.0),
         xlim=(float(case["period"][0]), float(case["period"][-1])),
     )
     for i, frequency in enumerate(case["frequency"].values[:MODES_SHOWN]):
@@ -74,5 +75,5 @@ def history_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     for ax in panels[-1]:
         ax.set_xlabel("time [s]")
     if any(shown.values()):
-        fig.legend(*panels[0, 1].get_legend_handles_labels(), loc="outside upper right", ncols=len(shown))
+        fig.legend(*panels[0, 1].get_legend_handles_labels(), loc="outside upper right", ncols=len(shown), columnspacing=1.0)
     return fig

@@ -1,13 +1,16 @@
 """What all figures have in common: width, letters, lines and colours told apart in grey, names of axes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import LogLocator, NullFormatter
 
-from ..table import in_words
+from ..messages import in_words
 
 WIDTH = 180 / 25.4
 """[inch]."""
@@ -46,8 +49,23 @@ JOINT_COLOURS = {"open": "#f2c029", "slipping": "#d7301f", "sticking": "#1a1a1a"
 JOINT_STATES = ("open", "sticking", "slipping", "slipping")
 
 
+LABEL_WIDTH = 35
+"""Characters of a case's label in a line: three labels fit side by side."""
+
+_P0, _P0_SHOWN = "$p_0$", "p₀"
+_UNBROKEN = "\N{NO-BREAK SPACE}"
+
+
+def in_lines(parts: list[str], width: int, between: str = ", ") -> str:
+    """Parts one after the other, in lines of `width` characters that break between parts where they can."""
+    seen = [part.replace(_P0, _P0_SHOWN) for part in parts]
+    whole = (part.replace(" ", _UNBROKEN) if len(part) < width else part for part in seen)
+    lines = wrap(between.join(whole), width, break_on_hyphens=False)
+    return "\n".join(lines).replace(_UNBROKEN, " ").replace(_P0_SHOWN, _P0)
+
+
 def symbol(axis: str) -> str:
-    return "$p_0$" if axis == "p0" else axis.replace("_", " ")
+    return _P0 if axis == "p0" else axis.replace("_", " ")
 
 
 def axis_unit(unit: str) -> tuple[str, float]:
@@ -56,9 +74,9 @@ def axis_unit(unit: str) -> tuple[str, float]:
     return ("MPa", 1e-6) if unit == "Pa" else (unit, 1.0)
 
 
-def point_in_words(ds: xr.Dataset, axis: str, i: int) -> str:
-    """One value of an axis in words: 'scale = 2'."""
-    return f"{symbol(axis)} = {in_words(ds[axis].values[i], ds[axis].attrs['units'])}"
+def point_in_words(ds: xr.Dataset, axis: str, i: int, width: int) -> str:
+    """One value of an axis in words, in lines of `width` characters: 'scale = 2'."""
+    return in_lines([symbol(axis), f"= {in_words(ds[axis].values[i], ds[axis].attrs['units'])}"], width, between=" ")
 
 
 def scale_x(ax: Axes, x: np.ndarray) -> None:
@@ -68,13 +86,28 @@ def scale_x(ax: Axes, x: np.ndarray) -> None:
         return
     if len(positive) == len(x):
         ax.set_xscale("log")
-        ax.xaxis.set_major_formatter("{x:g}")
+        log_ticks(ax.xaxis, x, most=4)
         return
     threshold = float(positive.min())
     ax.set_xscale("symlog", linthresh=threshold, linscale=0.4)
     ticks = [t for t in 10.0 ** np.arange(-12, 13) if threshold < t <= x.max()]
     ax.set_xticks([0.0, *ticks], ["0", *(f"{t:g}" for t in ticks)])
     ax.set_xlim(left=-0.2 * threshold)
+
+
+def log_ticks(axis: Axis, values: np.ndarray, most: int) -> None:
+    """Label 1, 2 and 5 times the powers of ten, or fewer of them where that makes more than `most` labels."""
+    powers = 10.0 ** np.arange(-12, 13)
+    low, high = values.min(), values.max()
+
+    def count(steps: Sequence[int]) -> int:
+        ticks = np.outer(steps, powers)
+        return int(((low <= ticks) & (ticks <= high)).sum())
+
+    steps = next((steps for steps in ((1, 2, 5), (1, 3)) if count(steps) <= most), (1,))
+    axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def joint_handles(kind: Callable[..., Any]) -> list[Any]:

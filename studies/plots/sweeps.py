@@ -7,8 +7,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..table import axes_of, in_words
-from .style import LINES, MANY_LINES, WIDTH, axis_unit, point_in_words, scale_x, symbol
+from ..messages import in_words
+from ..table import axes_of
+from .style import LINES, MANY_LINES, WIDTH, axis_unit, in_lines, log_ticks, point_in_words, scale_x, symbol
 
 GRID_QUANTITIES: dict[str, tuple[str, Callable[[xr.Dataset], xr.DataArray]]] = {
     "racking": ("peak racking [mm]", lambda ds: 1e3 * ds["peak_racking"]),
@@ -16,16 +17,27 @@ GRID_QUANTITIES: dict[str, tuple[str, Callable[[xr.Dataset], xr.DataArray]]] = {
     "slip": ("largest slip [mm]", lambda ds: 1e3 * ds["max_slip"].max("joint")),
 }
 
+MOST_COLUMNS = MOST_ROWS = 6
+
+LINE, ROW = 96, 15
+"""Characters of a line over the whole figure, and along the height of a panel in several rows."""
+
+LOGARITHMIC, ZERO = 10.0, 1e-6
+"""The values span more than this factor; and this part of the largest one is a zero, for which a logarithm has no place."""
+
 
 def grid_figure(ds: xr.Dataset, quantity: str) -> Figure:
     """Small multiples of one quantity: the first axis along x, the second as curves, the third as columns, the fourth as rows.
 
-    Further axes stand at their middle values.
+    Where there are too many curves, columns or rows, as many as can be told apart are chosen, evenly; further axes stand at their
+    middle values.
     """
     label, of = GRID_QUANTITIES[quantity]
     x, curves, across, down, *rest = [*axes_of(ds), "", ""]
     middle = {axis: ds.sizes[axis] // 2 for axis in rest if axis}
     ds = ds.isel(middle)
+    for axis, most in ((curves, len(MANY_LINES)), (across, MOST_COLUMNS), (down, MOST_ROWS)):
+        ds = ds.isel({axis: _spread(ds.sizes[axis], most)}) if axis else ds
     n_column, n_row = (ds.sizes[axis] if axis else 1 for axis in (across, down))
     fig = Figure(figsize=(WIDTH, 0.8 + (1.25 if n_row > 1 else 2.4) * n_row))
     panels = fig.subplots(n_row, n_column, sharex=True, sharey=True, squeeze=False)
@@ -33,34 +45,42 @@ def grid_figure(ds: xr.Dataset, quantity: str) -> Figure:
         place = {axis: i for axis, i in ((across, column), (down, row)) if axis}
         _curves(ax, ds.isel(place), of, x, curves)
         if row == 0 and across:
-            ax.set_title(point_in_words(ds, across, column))
+            ax.set_title(point_in_words(ds, across, column, LINE // n_column))
         if column == n_column - 1 and down:
             ax.annotate(
-                point_in_words(ds, down, row).replace(" = ", "\n= "),
+                point_in_words(ds, down, row, ROW),
                 (1.04, 0.5),
                 xycoords="axes fraction",
                 rotation=270,
                 va="center",
             )
-    values = of(ds).values
-    if (positive := values[values > 0]).size and positive.max() > 10 * positive.min():
+    values = of(ds).values[np.isfinite(of(ds).values)]
+    if values.size and values.max() > LOGARITHMIC * values.min() and values.min() > ZERO * values.max():
         panels[0, 0].set_yscale("log")
-        panels[0, 0].yaxis.set_major_formatter("{x:g}")
+        log_ticks(panels[0, 0].yaxis, values, most=6)
     unit, _ = axis_unit(ds[x].attrs["units"])
-    fixed = "".join(f", {symbol(axis)} = {in_words(ds[axis].values, ds[axis].attrs['units'])}" for axis in middle)
-    fig.supylabel(label + fixed, fontsize=8)
-    fig.supxlabel(f"{symbol(x)} [{unit}]" if unit != "1" else symbol(x), fontsize=8)
-    names = [in_words(value, ds[curves].attrs["units"]) for value in ds[curves].values[: len(MANY_LINES)]]
-    fig.legend(panels[0, 0].lines, names, title=symbol(curves), loc="outside upper center", ncols=len(MANY_LINES))
+    fixed = in_lines([f"{symbol(axis)} = {in_words(ds[axis].values, ds[axis].attrs['units'])}" for axis in middle], LINE)
+    below = f"{symbol(x)} [{unit}]" if unit != "1" else symbol(x)
+    fig.supxlabel(f"{below}\n{fixed}" if fixed else below, fontsize=8)
+    fig.supylabel(label, fontsize=8)
+    names = [in_words(value, ds[curves].attrs["units"]) for value in ds[curves].values]
+    beside = max(1, LINE // (7 + max(map(len, names))))
+    fig.legend(panels[0, 0].lines, names, title=symbol(curves), loc="outside upper center", ncols=beside, columnspacing=1.0)
     return fig
 
 
+def _spread(n: int, most: int) -> np.ndarray:
+    """Positions of at most `most` of n values, the first and the last among them."""
+    return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(int))
+
+
 def _curves(ax: Axes, ds: xr.Dataset, of: Callable[[xr.Dataset], xr.DataArray], x: str, curves: str) -> None:
-    """One panel: a curve for each value of `curves`, as many as there are lines to tell apart."""
+    """One panel: a curve for each value of `curves`."""
     _, factor = axis_unit(ds[x].attrs["units"])
     values = of(ds).transpose(x, curves).values
     for column, (colour, dash, marker) in zip(values.T, MANY_LINES, strict=False):
         ax.plot(factor * ds[x], column, color=colour, ls=dash, marker=marker, markersize=2.5, clip_on=False)
+    ax.update_datalim([(factor * value, 0.0) for value in ds[x].values], updatey=False)  # where cases failed too
     scale_x(ax, factor * ds[x].values)
 
 

@@ -212,7 +212,7 @@ def test_broken_knet_record_is_refused(file, text, message):
 
 def test_without_obspy_a_knet_record_says_what_to_install(file, monkeypatch):
     monkeypatch.setitem(sys.modules, "obspy", None)
-    with pytest.raises(MotionError, match=r'is a K-NET record, which obspy reads: pip install obspy'):
+    with pytest.raises(MotionError, match=r"is a K-NET record, which obspy reads: pip install obspy"):
         read_record(file(knet(COUNTS)))
     assert read_record(file(TITLE + NEW + AT2)).dt == 0.01
 

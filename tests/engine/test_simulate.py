@@ -18,6 +18,7 @@ from engine import (
     Status,
     Stepper,
     System,
+    Trace,
     build_system,
     equilibrium,
     natural_frequencies,
@@ -79,6 +80,7 @@ def test_shapes(response, system):
     expected = {
         "values": (4, N_STEP + 1, n_value),
         "fractions": (4, N_STEP + 1, 2),
+        "states": (4, N_STEP + 1, n_point),
         "peaks": (4, 2, n_value),
         "joint_peaks": (4, 4, n_point),
         "first_slip": (4, n_point),
@@ -128,8 +130,9 @@ def test_histories_are_thinned_while_peaks_see_every_step(stepper, response, eve
     np.testing.assert_allclose(thinned.time, response.time[::every], rtol=1e-15)
     np.testing.assert_array_equal(thinned.values, response.values[:, ::every])
     np.testing.assert_array_equal(thinned.fractions, response.fractions[:, ::every])
+    np.testing.assert_array_equal(thinned.states, response.states[:, ::every])
     for name, x in arrays(thinned).items():
-        if name not in ("values", "fractions"):
+        if name not in ("values", "fractions", "states"):
             np.testing.assert_array_equal(x, getattr(response, name), err_msg=name)
 
 
@@ -150,7 +153,7 @@ def test_shape_is_that_of_the_largest_racking(response, system):
 
 
 def test_joints_are_seen_at_every_step(stepper, response, system):
-    """Peaks, first slip and fractions against a march by hand."""
+    """Peaks, first slip, states and fractions against a march by hand."""
     lanes = Lanes.of([9.81 * system.weight] * 4, [system.joint_law()] * 4, MOTIONS)
     state, _ = equilibrium(system, lanes, [lanes.standing], natural_frequencies(system, 1)[0])
     stepper.start(state, lanes, lanes.ground[0])
@@ -170,6 +173,9 @@ def test_joints_are_seen_at_every_step(stepper, response, system):
     slid = (states != OPEN) & (abs(slips - slip[:4]) > elastic[:4])
     first = np.where(slid.any(axis=0), DT * slid.argmax(axis=0), np.nan)
     np.testing.assert_allclose(response.first_slip, first, rtol=1e-15)
+    np.testing.assert_array_equal(np.moveaxis(response.states, 0, 1), states)
+    assert response.states.dtype == np.int8
+    assert len(np.unique(response.states)) == 4  # open, sticking, slipping both ways: the test tells them apart
     length = system.points.length
     np.testing.assert_allclose(response.fractions[..., 0].T, (states == OPEN) @ length / length.sum(), rtol=1e-14)
     np.testing.assert_allclose(response.fractions[..., 1].T, (states > 1) @ length / length.sum(), rtol=1e-14)
@@ -218,8 +224,9 @@ def test_no_motion_at_all_leaves_the_static_state(stepper):
 def assert_failed(response: Response, lane: int, status: Status, reason: str) -> None:
     assert response.status[lane] == status
     assert reason in response.reason[lane]
+    assert (response.states[lane] == -1).all()
     for name, x in arrays(response).items():
-        if name != "status":
+        if name not in ("status", "states"):
             assert np.isnan(x[lane]).all(), name
 
 
@@ -265,16 +272,16 @@ def test_numbers_that_run_out_without_joints_are_told(block_mesh):
 
 @pytest.fixture
 def failing(system, monkeypatch):
-    """A stepper whose lane 1 is not solved in its 30th step; `parts` says whether halves are."""
+    """A stepper of which a lane is not solved in its 30th step; `parts` says whether halves are."""
 
-    def make(parts: bool) -> Stepper:
+    def make(parts: bool, lane: int = 1) -> Stepper:
         stepper = Stepper(system, Newmark(DT), Rayleigh(0.8, 0.002))
         solve, count = stepper._solve, [0]
 
         def solve_or_not(*arguments):
             failed = solve(*arguments)
             count[0] += 1
-            failed[1] |= count[0] == 30
+            failed[lane] |= count[0] == 30
             return failed
 
         monkeypatch.setattr(stepper, "_solve", solve_or_not)
@@ -340,3 +347,61 @@ def test_stepper_that_has_marched_other_joints_gives_the_same_bits(system, joint
     assert expected.status.tolist() == [Status.DONE] * 2
     for lane in range(2):
         assert_same_lane(found, lane, expected, lane)
+
+
+# Trace
+
+
+def traced(stepper: Stepper, *arguments, **options) -> tuple[list[Trace], Response]:
+    """What is told of every step, and the response."""
+    told: list[Trace] = []
+    return told, march(stepper, *arguments, trace=told.append, **options)
+
+
+@pytest.mark.parametrize("every", [1, 7])
+def test_trace_tells_every_step_of_the_first_lane(stepper, response, every):
+    """Whatever is kept: lane 0 is the shaken case, whose joint changes."""
+    motions = MOTIONS[2:] + MOTIONS[:2]
+    told, found = traced(stepper, motions, every=every)
+    assert [step.step for step in told] == list(range(N_STEP + 1))
+    np.testing.assert_allclose([step.time for step in told], response.time, rtol=1e-15)
+    np.testing.assert_array_equal([step.states for step in told], response.states[2])
+    assert max(step.rounds for step in told) == response.iterations[2]
+    assert max(step.residual for step in told) == response.residual[2]
+    assert not any(step.halved for step in told)
+    for lane in range(4):  # to be watched changes nothing
+        np.testing.assert_array_equal(found.peaks[lane], response.peaks[(lane + 2) % 4])
+
+
+def test_trace_begins_with_the_static_state(stepper, response):
+    told, _ = traced(stepper, MOTIONS)
+    assert (told[0].step, told[0].time, told[0].rounds, told[0].residual, told[0].halved) == (0, 0.0, 0, 0.0, False)
+    np.testing.assert_array_equal(told[0].states == OPEN, response.static_open[0])
+    assert all(step.rounds >= 1 for step in told[1:])
+
+
+def test_trace_tells_the_step_that_was_halved(failing):
+    """The 30th solve is that of the 30th step, for every solve before it succeeds."""
+    told, found = traced(failing(parts=True, lane=0), MOTIONS)
+    assert found.status[0] == Status.SUBSTEPS
+    assert [step.step for step in told if step.halved] == [30]
+    assert len(told) == N_STEP + 1
+
+
+def test_trace_ends_where_the_first_lane_fails(failing, response):
+    told, found = traced(failing(parts=False, lane=0), MOTIONS)
+    assert found.status.tolist() == [Status.NOT_CONVERGED, Status.DONE, Status.DONE, Status.DONE]
+    assert [step.step for step in told] == list(range(30))
+    np.testing.assert_array_equal([step.states for step in told], response.states[0, :30])
+
+
+def test_trace_does_not_end_where_another_lane_fails(stepper):
+    told, found = traced(stepper, MOTIONS[1:3], [1.0, -1.0])
+    assert found.status.tolist() == [Status.DONE, Status.NO_EQUILIBRIUM]
+    assert len(told) == N_STEP + 1
+
+
+def test_trace_of_a_case_without_equilibrium_tells_no_step(stepper):
+    told, found = traced(stepper, MOTIONS[1:3], [-1.0, 1.0])
+    assert found.status.tolist() == [Status.NO_EQUILIBRIUM, Status.DONE]
+    assert told == []

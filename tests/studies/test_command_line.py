@@ -16,6 +16,8 @@ import studies.__main__
 from engine.spec import Layer, Spec
 from studies import load_study, run_study, sentences, shipped_studies, table, write_dataset
 from studies.__main__ import app
+from studies.show import TRACE_HEAD, show_lines
+from studies.sizes import DomainSizes
 
 from .conftest import FAILING, QUICK, SHORT, study_of
 
@@ -129,7 +131,7 @@ def test_out_names_the_file(quick_toml, folder):
 def test_plot_draws_beside_the_results(quick_toml, folder):
     outcome = call("run", quick_toml, "--plot", "--workers", 1)
     assert outcome.exit_code == 0
-    figures = [f"results/quick-{name}.png" for name in ("deformed", "history", "mesh", "peaks", "record")]
+    figures = [f"results/quick-{name}.png" for name in ("contact", "deformed", "history", "mesh", "peaks", "record")]
     assert files(folder) == sorted(["quick.toml", "results/quick.nc", *figures])
     for figure in figures:
         assert f"figure {figure}" in flat(outcome.stdout)
@@ -246,7 +248,7 @@ def test_long_messages_are_not_broken(folder):
 def test_a_missing_study_is_told_with_the_shipped_names(folder):
     refused(
         call("run", "nix"),
-        '"nix": there is no such file, nor a shipped study of that name (damping, domain_size, p0, paper, scale)',
+        '"nix": there is no such file, nor a shipped study of that name (damping, domain_size, grid, p0, paper, scale)',
     )
 
 
@@ -286,7 +288,16 @@ def test_studies_of_one_name_do_not_overwrite_each_other(folder):
 
 
 @pytest.mark.parametrize(
-    "arguments", [("run", "p0", "--workers", "0"), ("run", "p0", "--nix"), ("nix",), ("check",)], ids=" ".join
+    "arguments",
+    [
+        ("run", "p0", "--workers", "0"),
+        ("run", "p0", "--nix"),
+        ("run", "p0", "--trace", "--case", "0"),
+        ("nix",),
+        ("check",),
+        ("show",),
+    ],
+    ids=" ".join,
 )
 def test_wrong_options_end_with_two(arguments, folder):
     outcome = call(*arguments)
@@ -295,7 +306,7 @@ def test_wrong_options_end_with_two(arguments, folder):
     assert files(folder) == []
 
 
-@pytest.mark.parametrize("command", ["table", "plot"])
+@pytest.mark.parametrize("command", ["table", "plot", "show"])
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
@@ -316,7 +327,7 @@ def test_a_file_that_holds_no_results_is_told_in_one_line(command, content, reas
     assert reason in line
 
 
-@pytest.mark.parametrize("command", ["table", "plot"])
+@pytest.mark.parametrize("command", ["table", "plot", "show"])
 def test_a_netcdf_file_of_others_is_told_in_one_line(command, folder):
     xr.Dataset({"t2m": ("time", [1.0])}).to_netcdf("x.nc", engine="netcdf4")
     refused(call(command, "x.nc"), "x.nc: was not written by coralquake")
@@ -334,7 +345,10 @@ def test_check_says_what_would_run_and_runs_nothing(quick_toml, folder, monkeypa
     assert lines[0] == "Quick"
     assert any(line.startswith("cases ") and "4 in 1 batch" in line and "160 case-steps" in line for line in lines)
     assert any(line.startswith("mesh ") and "32 structure + 20 joint + 132 ground elements" in line for line in lines)
-    assert sum(line.startswith("warning: ") for line in lines) == 3  # step, bending, uplift
+    warnings = [line.removeprefix("warning: ") for line in lines if line.startswith("warning: ")]
+    starts = ("time.dt = 0.01 s ", "the walls may be ", "the net uplift ", "pressure.p0 = 4 MPa bends ")
+    assert len(warnings) == len(starts)
+    assert all(warning.startswith(start) for warning, start in zip(warnings, starts, strict=True))
 
 
 def test_check_takes_a_shipped_name(folder):
@@ -398,7 +412,84 @@ def test_plot_names_the_figures_it_draws(folder, failing_ds):
     assert files(folder) == ["lost-mesh.png", "lost.nc"]
 
 
+# show ----------------------------------------------------------------------------------------------------------------------
+
+
+def test_show_says_what_a_file_is(results, reopened, folder):
+    outcome = call("show", results)
+    assert outcome.exit_code == 0
+    assert outcome.stdout.splitlines() == list(show_lines(reopened))  # no line is broken or coloured
+    assert files(folder) == ["quick.nc"]
+
+
+# trace ---------------------------------------------------------------------------------------------------------------------
+
+
+def test_trace_prints_a_case_step_by_step_and_writes_nothing(quick_toml, folder, quick_ds):
+    """The third case, against the dataset: the joint points of each state at the steps that it keeps."""
+    outcome = call("run", quick_toml, "--trace", "--case", 3)
+    assert outcome.exit_code == 0
+    assert outcome.stderr == ""
+    assert files(folder) == ["quick.toml"]
+    title, head, *steps, end = outcome.stdout.splitlines()
+    assert title.startswith("case 3 of 4: p0 = ")
+    assert head == TRACE_HEAD
+    assert end == "done"
+    numbers = [[float(word) for word in line.split()] for line in steps]
+    assert [number[0] for number in numbers] == list(range(41))
+    state = quick_ds["joint_state"].isel(p0=2)
+    for kept, (_, time, *counts, _, _) in enumerate(numbers[::2]):
+        here = state.isel(time=kept).values
+        assert time == pytest.approx(float(quick_ds["time"][kept]), abs=1e-12)
+        assert counts == [(here == 0).sum(), (here == 1).sum(), (here > 1).sum()]
+
+
+def test_the_only_case_needs_no_number(folder):
+    (folder / "one.toml").write_text(SHORT)
+    for number in ((), ("--case", 1)):
+        outcome = call("run", "one.toml", "--trace", *number)
+        assert outcome.exit_code == 0
+        assert outcome.stdout.splitlines()[0] == "case 1 of 1: the only case"
+        assert len(outcome.stdout.splitlines()) == 3 + 41
+
+
+def test_trace_of_a_failed_case_ends_with_its_reason(folder):
+    (folder / "loose.toml").write_text(FAILING)
+    outcome = call("run", "loose.toml", "--trace", "--case", 2)
+    assert outcome.exit_code == 1
+    reason = "no equilibrium: no static equilibrium: nothing holds the box under these loads"
+    assert outcome.stdout.splitlines()[-1] == reason
+    assert call("run", "loose.toml", "--trace", "--case", 1).exit_code == 0
+    assert files(folder) == ["loose.toml"]
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("--trace",), "--case: must be a number from 1 to 4, the cases of quick"),
+        (("--trace", "--case", 5), "--case 5: must be a number from 1 to 4, the cases of quick"),
+        (("--case", 2), "--case 2: is for --trace"),
+        (("other.toml", "--trace"), "--trace: is for one study, 2 are named"),
+        (("other.toml", "--trace", "--case", 1), "--trace: is for one study, 2 are named"),
+    ],
+    ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else None,
+)
+def test_trace_wants_one_case_of_one_study(options, line, quick_toml, folder):
+    refused(call("run", quick_toml, *options), line)
+    assert files(folder) == ["quick.toml"]
+
+
+def test_trace_of_a_wrong_study_tells_its_mistakes(folder):
+    (folder / "bad.toml").write_text("[box]\nnu = 0.7\n")
+    refused(call("run", "bad.toml", "--trace"), "bad.toml: box.nu = 0.7: must be less than 0.5")
+
+
 # list and schema -----------------------------------------------------------------------------------------------------------
+
+
+def test_these_studies_are_shipped():
+    assert list(shipped_studies()) == ["damping", "domain_size", "grid", "p0", "paper", "scale"]
+    assert (len(load_study("grid").cases), len(load_study("paper").cases)) == (320, 1)
 
 
 def test_list_names_the_shipped_studies():
@@ -424,7 +515,8 @@ def test_schema_lists_every_field_with_its_meaning():
     found = fields_of_schema()
     sections = {name: Layer if name == "layer" else type(info.default) for name, info in Spec.model_fields.items()}
     expected = {f"{table}.{field}" for table, section in sections.items() for field in section.model_fields}
-    assert {name for name in found if not name.startswith("sweep.")} == expected
+    assert {name for name in found if not name.startswith(("sweep.", "domain_size."))} == expected
+    assert {name for name in found if name.startswith("domain_size.")} == {f"domain_size.{n}" for n in DomainSizes.model_fields}
     assert all(len(meaning) > 3 for _, meaning in found.values())
 
 
@@ -443,10 +535,17 @@ def test_defaults_in_the_schema_can_be_copied_into_a_study():
             assert tomllib.loads(f"x = {value}"), name
 
 
+def test_the_domain_sizes_of_the_schema_are_a_study():
+    text = call("schema").stdout
+    table = text[text.index("[domain_size]") :]
+    (axis,) = study_of(SHORT + table).axes
+    assert (axis.name, len(axis.values)) == ("domain", 6 + 2 * 5)
+
+
 def test_help_names_the_commands():
     outcome = call("--help")
     assert outcome.exit_code == 0
-    for command in ("run", "check", "plot", "table", "list", "schema"):
+    for command in ("run", "check", "plot", "show", "table", "list", "schema"):
         assert re.search(rf"\b{command}\b", outcome.stdout)
 
 
@@ -493,6 +592,18 @@ def test_table_on_a_narrow_terminal(narrow):
     row = answer.stdout.decode("ascii").splitlines()[-1].split()
     assert len(row) == 10
     assert [float(word) for word in row[:2]] == [4e6, 0.0]
+
+
+def test_show_on_a_narrow_terminal(narrow):
+    """Lines are not broken: a pager or grep takes them as they are; letters that the encoding lacks do not stop it."""
+    folder, environment = narrow
+    answer = shell(folder, "show", "results/quick.nc", **environment)
+    assert (answer.returncode, answer.stderr) == (0, b"")
+    lines = answer.stdout.decode("ascii").splitlines()
+    assert lines[0] == "Quick"
+    assert "\x1b" not in answer.stdout.decode("ascii")
+    assert sum(line.startswith("base_acceleration ") for line in lines) == 1
+    assert lines[-1].endswith('spacing = "log" }]')
 
 
 def test_a_wrong_study_in_a_process_of_its_own(narrow):

@@ -59,6 +59,8 @@ def test_defaults_as_text_are_those_of_spec(field):
         ("motion.peak", "> 0"),
         ("layer.N.Vs", "> 0"),
         ("box.offset", ""),
+        ("output.every", "≥ 1, ≤ 100,000"),
+        ("synthetic.seed", "≥ 0, ≤ 9,223,372,036,854,775,807"),
     ],
 )
 def test_rules_are_those_that_are_checked(name, rule):
@@ -102,11 +104,43 @@ def test_other_names_do_not_resolve(name):
         ("duratoin", "time.duration"),
         ("motion.dt", "time.dt"),
         ("mesh.wall_element", "mesh.wall_elements"),
+        ("box.Width", "box.width"),
+        ("Box.E", "box.E"),
+        ("P0", "pressure.p0"),
+        ("damping_ration", "damping.ratio"),
+        ("ricker.freq", "ricker.frequency"),
+        ("layer.2.botom", "layer.2.bottom"),
+        ("layer_2_botom", "layer.2.bottom"),
+        ("layer.3.unit_weigth", "layer.3.unit_weight"),
+        ("layer.E", "layer.1.E"),
+        ("layer_E", "layer.1.E"),
+        ("bottom", "layer.1.bottom"),
     ],
 )
 def test_nearest_known_name(written, meant):
     assert nearest(written, list(FIELDS)) == f"; did you mean {meant}?"
 
 
-def test_nothing_is_proposed_for_a_name_like_no_other():
-    assert nearest("zzzzzz", list(FIELDS)) == ""
+@pytest.mark.parametrize("name", ["zzzzzz", "", ".", "studies", "time.steps", "layer.1.soil", "layer.2.name", "a.b.c"])
+def test_nothing_is_proposed_for_a_name_like_no_other(name):
+    """Least of all a field of another table that happens to share some letters."""
+    assert nearest(name, list(FIELDS)) == ""
+
+
+def test_a_known_name_in_quotes_is_one_key():
+    assert nearest("box.width", list(FIELDS)) == "; write box.width without quotes"
+
+
+def test_numbers_are_told_from_words():
+    words = {field.name for field in catalogue() if field.single and not field.numeric}
+    assert words == {
+        "motion.record",
+        "motion.vertical_record",
+        "motion.record_unit",
+        "damping.joints",
+        "mesh.mass",
+        "joint.quadrature",
+        "supports.sides",
+        "gravity.self_weight",
+    }
+    assert all(not field.unit for field in catalogue() if not field.numeric)

@@ -1,47 +1,113 @@
 """Figures: every one is written, 180 mm wide, legible, and the colours of the joint are its states."""
 
 import re
-from itertools import pairwise
+from itertools import combinations
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import same_color
+from matplotlib.colors import same_color, to_hex, to_rgb
 from matplotlib.image import imread
 from matplotlib.text import Text
 
 from studies import run_study, write_dataset
+from studies.domain_size import SOURCE_SIZE, SOURCE_TOLERANCE, series_of
 from studies.plots import _shown, draw_all
 from studies.plots.box import deformed_figure, mesh_figure
+from studies.plots.contact import contact_figure
+from studies.plots.convergence import convergence_figure
 from studies.plots.motion import history_figure, record_figure
-from studies.plots.style import JOINT_COLOURS, JOINT_STATES, STYLE, WIDTH
-from studies.plots.sweeps import peaks_figure
-from studies.table import cases_of
+from studies.plots.style import JOINT_COLOURS, JOINT_STATES, LINES, MANY_LINES, STYLE, WIDTH, in_lines
+from studies.plots.sweeps import GRID_QUANTITIES, grid_figure, peaks_figure
+from studies.table import axes_of, cases_of
 
 from .conftest import COARSE, SHORT, study_of
 
-NAMES = ("mesh", "record", "history", "deformed", "peaks")
+NAMES = ("mesh", "record", "history", "deformed", "contact")
+"""Figures of every study in which a case came to its end."""
+
+GRID = tuple(f"sweep-{quantity}" for quantity in GRID_QUANTITIES)
+
+FIGURES = (*NAMES, "peaks", "grid of two", "grid of three", "grid of six", "convergence", "two directions")
+
 SHOWN = {0: "first", 3: "last"}
 
+TWO_DIRECTIONS = (
+    SHORT.replace("[mesh]", 'vertical_record = "ridgecrest-2019-clc-up.AT2"\n[mesh]')
+    + '[pressure]\np0 = "0.283 MPa"\n[sweep]\nscale = [0.5, 1]\n'
+)
 
-def figures_of(ds):
-    cases = cases_of(ds)
-    yield "mesh", mesh_figure(ds)
-    yield "record", record_figure(cases)
-    yield "history", history_figure(cases, SHOWN)
-    yield "deformed", deformed_figure(cases, SHOWN)
-    yield "peaks", peaks_figure(cases, "p0")
+SIZES = SHORT + '[domain_size]\nwidth = { from = "12.8 m", num = 4 }\ndepth = { from = "14 m", num = 3 }\n'
+
+AXES = {
+    "p0": ("Pa", [5e4, 2e5, 8e5, 3.2e6]),
+    "damping_ratio": ("1", [0.02, 0.05, 0.08]),
+    "scale": ("1", [0.5, 1.0]),
+    "domain_width": ("m", [16.0, 20.0, 25.0, 31.25, 39.0]),
+    "box_nu": ("1", [0.2, 0.25, 0.3]),
+    "layer_3_friction": ("1", [0.3, 0.4]),
+}
+"""Axes of a grid, of other lengths each so that none can stand in another's place."""
+
+
+def grid_of(names, **values):
+    """A dataset of a grid of these axes; the quantities [mm] are the numbers given, of any shape that fits, or random ones."""
+    axes = {name: values.pop(name, AXES[name][1]) for name in names}
+    shape = tuple(len(points) for points in axes.values())
+    rng = np.random.default_rng(7)
+    random = {quantity: rng.uniform(0.02, 3.0, shape) for quantity in GRID_QUANTITIES}
+    given = {name: 1e-3 * np.broadcast_to(np.asarray(array, dtype=float), shape) for name, array in (random | values).items()}
+    joint = np.array([0.2, 1.0, 0.5])
+    variables = {
+        "status": (tuple(names), np.zeros(shape, dtype=np.int8)),
+        "peak_racking": (tuple(names), given["racking"]),
+        "max_opening": ((*names, "joint"), given["opening"][..., None] * joint),
+        "max_slip": ((*names, "joint"), given["slip"][..., None] * joint),
+    }
+    return xr.Dataset(variables).assign_coords({name: (name, points, {"units": AXES[name][0]}) for name, points in axes.items()})
+
+
+def laid_out(draw):
+    """A figure, laid out as it is saved."""
+    with mpl.rc_context(STYLE):
+        figure = draw()
+        figure.draw_without_rendering()
+    return figure
 
 
 @pytest.fixture(scope="module")
-def figures(quick_ds):
-    """Every figure of the quick study, laid out as it is saved."""
+def both():
+    """A study with a vertical record."""
+    return run_study(study_of(TWO_DIRECTIONS), workers=1)
+
+
+@pytest.fixture(scope="module")
+def sizes():
+    """A domain_size study: four widths, three depths, three depths as the source does it."""
+    return run_study(study_of(SIZES), workers=1)
+
+
+@pytest.fixture(scope="module")
+def figures(quick_ds, both, sizes):
+    """Every figure, of the quick study where that has it, laid out as it is saved."""
+    cases, names = cases_of(quick_ds), list(AXES)
+    draw = {
+        "mesh": lambda: mesh_figure(quick_ds),
+        "record": lambda: record_figure(cases),
+        "history": lambda: history_figure(cases, SHOWN),
+        "deformed": lambda: deformed_figure(cases, SHOWN),
+        "contact": lambda: contact_figure(cases, SHOWN),
+        "peaks": lambda: peaks_figure(cases, "p0"),
+        "grid of two": lambda: grid_figure(grid_of(names[:2]), "racking"),
+        "grid of three": lambda: grid_figure(grid_of(names[:3]), "opening"),
+        "grid of six": lambda: grid_figure(grid_of(names), "racking"),
+        "convergence": lambda: convergence_figure(sizes),
+        "two directions": lambda: record_figure(cases_of(both)),
+    }
+    assert tuple(draw) == FIGURES
     with mpl.rc_context(STYLE):
-        found = dict(figures_of(quick_ds))
-        for figure in found.values():
-            figure.draw_without_rendering()
-        yield found
+        yield {name: laid_out(one) for name, one in draw.items()}
 
 
 @pytest.fixture(scope="module")
@@ -55,16 +121,38 @@ def texts_of(figure):
     return [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
 
 
+def seen(figure):
+    """All texts that are seen: those of ticks within the axes alone."""
+    texts = [*figure.texts]
+    for legend in figure.legends:
+        texts += [legend.get_title(), *legend.get_texts()]
+    for ax in figure.axes:
+        texts += [ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label, *ax.texts]
+        texts += [ax.xaxis.get_offset_text(), ax.yaxis.get_offset_text()]
+        if ax.get_legend():
+            texts += ax.get_legend().get_texts()
+        for axis in (ax.xaxis, ax.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            room = 1e-9 * (high - low)
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            texts += [tick.label1 for tick in ticks if low - room <= tick.get_loc() <= high + room]
+    return [text for text in texts if text.get_visible() and text.get_text().strip()]
+
+
+def lightness(colour):
+    return np.dot(to_rgb(colour), (0.299, 0.587, 0.114))
+
+
 # files ---------------------------------------------------------------------------------------------------------------------
 
 
 def test_all_figures_are_written_beside_the_results(drawn):
-    assert tuple(drawn) == NAMES
+    assert tuple(drawn) == (*NAMES, "peaks")
     folder = drawn["mesh"].parent
-    assert sorted(path.name for path in folder.iterdir()) == sorted(f"quick-{name}.png" for name in NAMES)
+    assert sorted(path.name for path in folder.iterdir()) == sorted(f"quick-{name}.png" for name in drawn)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "peaks"])
 def test_figures_show_something(name, drawn):
     image = imread(drawn[name])[..., :3]
     ink = (image < 0.95).any(axis=2)
@@ -74,7 +162,7 @@ def test_figures_show_something(name, drawn):
     assert np.ptp(columns) > 0.7 * image.shape[1]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "peaks"])
 def test_figures_are_180_mm_wide_at_200_dots_an_inch(name, drawn):
     height, width = imread(drawn[name]).shape[:2]
     assert abs(width - 180 / 25.4 * 200) < 1  # whole pixels
@@ -90,58 +178,95 @@ def test_drawing_leaves_the_style_of_others_alone(failing_ds, tmp_path):
 # legibility ----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FIGURES)
 def test_text_is_seven_points_or_more(name, figures):
     assert figures[name].get_figwidth() == WIDTH == 180 / 25.4
+    assert figures[name].get_figheight() < 250 / 25.4  # a page
     sizes = [text.get_fontsize() for text in texts_of(figures[name])]
     assert len(sizes) > 3
     assert min(sizes) >= 7
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_text_stays_inside_the_figure(name, figures):
-    figure = figures[name]
+def check_texts(figure):
+    """All texts lie on the page and none on another."""
     width, height = figure.get_size_inches() * figure.dpi
-    for text in texts_of(figure):
-        box = text.get_window_extent()
-        if box.width and any(text in ax.texts or text is ax.title or text is ax._left_title for ax in figure.axes):
-            assert box.x0 >= -1, text.get_text()  # a pixel of rounding
-            assert box.x1 <= width + 1, text.get_text()
-            assert box.y0 >= -1, text.get_text()
-            assert box.y1 <= height + 1, text.get_text()
+    boxes = {text: text.get_window_extent() for text in seen(figure)}
+    for text, box in boxes.items():
+        assert box.x0 >= -1, text.get_text()  # a pixel of rounding
+        assert box.x1 <= width + 1, text.get_text()
+        assert box.y0 >= -1, text.get_text()
+        assert box.y1 <= height + 1, text.get_text()
+    for (first, box), (second, other) in combinations(boxes.items(), 2):
+        # half a pixel of rounding
+        assert not box.padded(-0.5).overlaps(other.padded(-0.5)), (first.get_text(), second.get_text())
 
 
-@pytest.mark.parametrize("name", ["record", "history", "deformed", "peaks"])
-def test_titles_and_labels_do_not_overlap(name, figures):
-    heads = [t for ax in figures[name].axes for t in (ax._left_title, ax.xaxis.label, ax.yaxis.label) if t.get_text()]
-    boxes = [head.get_window_extent() for head in heads]
-    for i, box in enumerate(boxes):
-        for other in boxes[i + 1 :]:
-            assert not box.overlaps(other)
+@pytest.mark.parametrize("name", FIGURES)
+def test_text_stays_on_the_page_and_lies_on_no_other(name, figures):
+    check_texts(figures[name])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FIGURES)
 def test_axes_have_labels_with_units(name, figures):
-    for ax in figures[name].axes:
-        for label in (ax.get_xlabel(), ax.get_ylabel()):
-            assert label == "" or re.search(r"\[.+\]$", label), label
-    assert any(ax.get_xlabel() for ax in figures[name].axes)
-    assert any(ax.get_ylabel() for ax in figures[name].axes)
+    figure = figures[name]
+    labels = [label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())]
+    labels += [text.get_text().split("\n")[0] for text in (figure._supxlabel, figure._supylabel) if text is not None]
+    labels = [label for label in labels if label]
+    assert all(re.search(r"\[.+\]$", label) for label in labels), labels
+    assert len(labels) > 1
 
 
-def test_labels_of_several_swept_fields_do_not_overlap():
-    """Three swept fields make long titles over panels that stand side by side."""
-    sweep = '[sweep]\np0 = ["0.283 MPa", "1 MPa", "4 MPa"]\ndamping_ratio = [0.05]\nscale = [0.5]\n'
-    cases = cases_of(run_study(study_of(SHORT + sweep), workers=1))
-    label = "$p_0$ = 0.283 MPa, damping ratio = 0.05, scale = 0.5"
-    shown = _shown(cases, ["p0", "damping_ratio", "scale"])
-    assert " ".join(shown[0].split()) == label
-    with mpl.rc_context(STYLE):
-        figure = deformed_figure(cases, shown)
-        figure.draw_without_rendering()
-        boxes = [ax._left_title.get_window_extent() for ax in figure.axes]
-    assert all(left.x1 <= right.x0 for left, right in pairwise(boxes))
-    assert boxes[-1].x1 <= figure.get_figwidth() * figure.dpi
+def test_the_legend_of_the_modes_lies_on_no_spectrum(both):
+    """Wherever its peak lies: it is tried with one that is as high at all periods."""
+    cases = cases_of(both).copy()
+    cases["response_spectrum"] = xr.ones_like(cases["response_spectrum"])
+    for ax in laid_out(lambda: record_figure(cases)).axes[1::2]:
+        box = ax.get_legend().get_window_extent()
+        assert box.y0 > ax.transData.transform((1.0, 1.0))[1]
+
+
+def test_lines_are_told_apart_in_grey():
+    """The cases side by side by their dashes, the many by dash and marker together."""
+    assert len({dash for _, dash in LINES}) == len(LINES)
+    assert len({(dash, marker) for _, dash, marker in MANY_LINES}) == len(MANY_LINES) == 8
+    assert len({marker for _, _, marker in MANY_LINES}) == 8
+
+
+def check_side_by_side(cases, shown):
+    """The figures that tell cases apart by their labels, lines of their legends too."""
+    for figure in (deformed_figure, history_figure, contact_figure):
+        laid = laid_out(lambda figure=figure: figure(cases, shown))
+        check_texts(laid)
+        for legend in laid.legends:
+            box = legend.get_window_extent()
+            assert box.x0 >= 0
+            assert box.x1 <= laid.get_figwidth() * laid.dpi
+
+
+def test_long_labels_of_cases_stay_on_the_page(quick_ds):
+    """Seven swept fields make long titles over panels that stand side by side."""
+    points = {"p0": (283e3, "Pa"), "damping_ratio": (0.05, "1"), "scale": (0.5, "1"), "damping_reference_width": (31.25, "m")}
+    points |= {"record": ("ridgecrest-2019-clc-360.AT2", ""), "layer_3_friction": (0.41, "1"), "box_nu": (0.25, "1")}
+    cases = cases_of(quick_ds).drop_vars("p0")
+    cases = cases.assign_coords({axis: ("case", [value] * 4, {"units": unit}) for axis, (value, unit) in points.items()})
+    assert _shown(cases, list(points)[:3])[0] == "$p_0$ = 0.283 MPa,\ndamping ratio = 0.05, scale = 0.5"
+    check_side_by_side(cases, _shown(cases, list(points)))
+
+
+def test_sizes_speak_for_themselves(sizes):
+    cases = cases_of(sizes)
+    shown = _shown(cases, ["domain"])
+    assert list(shown.values()) == ["width 12.8 m", "depth 17.5 m", "depth 21.88 m, record at base"]
+    check_side_by_side(cases, shown)
+
+
+@pytest.mark.parametrize("width", [12, 20, 35])
+def test_parts_are_broken_into_lines_between_parts(width):
+    parts = ["$p_0$ = 2 MPa", "scale = 0.5", "damping ratio = 0.05", "record = a-very-long-name-of-a-record.AT2"]
+    lines = in_lines(parts, width).split("\n")
+    assert " ".join(lines) == ", ".join(parts) or width < 37  # the name alone is longer
+    assert all(len(line.replace("$p_0$", "p0")) <= width for line in lines)
+    assert sum("scale = 0.5" in line for line in lines) == 1
 
 
 # what the figures show -----------------------------------------------------------------------------------------------------
@@ -183,19 +308,41 @@ def test_a_logarithmic_sweep_with_zero_shows_zero(figures):
     assert "0" in [label.get_text() for label in ax.get_xticklabels()]
 
 
-def test_the_record_is_that_of_the_first_case(quick_ds, figures):
-    (ax,) = figures["record"].axes
-    np.testing.assert_array_equal(ax.lines[0].get_ydata(), quick_ds["base_acceleration"].values[0, :, 0])
-    assert "1.708" in ax._left_title.get_text() or "1.709" in ax._left_title.get_text()
+def check_record(figure, case, components):
+    """A row for each component: its history and, beside it, its spectrum with the periods of the modes."""
+    assert len(figure.axes) == 2 * len(components)
+    for (history, spectrum), component in zip(np.reshape(figure.axes, (-1, 2)), components, strict=True):
+        motion = case["base_acceleration"].sel(component=component)
+        np.testing.assert_array_equal(history.lines[0].get_xdata(), case["time"])
+        np.testing.assert_array_equal(history.lines[0].get_ydata(), motion)
+        direction, *_, peak, unit = history._left_title.get_text().split()
+        assert direction == {"x": "horizontal", "y": "vertical"}[component]
+        assert (float(peak), unit) == (
+            pytest.approx(float(case["peak_base_acceleration"].sel(component=component)), rel=5e-4),
+            "m/s²",
+        )
+        np.testing.assert_array_equal(spectrum.lines[0].get_xdata(), case["period"])
+        np.testing.assert_array_equal(spectrum.lines[0].get_ydata(), case["response_spectrum"].sel(component=component))
+        assert spectrum.get_xscale() == "log"
+        modes = spectrum.lines[1:]
+        np.testing.assert_allclose([line.get_xdata()[0] for line in modes], 1 / case["frequency"][:3], rtol=1e-14)
+        assert len({line.get_linestyle() for line in modes}) == 3
+        words = [text.get_text() for text in spectrum.get_legend().get_texts()]
+        assert words == [f"mode {i + 1}: {f:.3g} Hz" for i, f in enumerate(case["frequency"].values[:3])]
 
 
-def test_both_directions_of_a_record_are_shown():
-    text = SHORT + '[motion]\nvertical_record = "ridgecrest-2019-clc-up.AT2"\n'
-    text = text.replace("[motion]\n", "", 1).replace('record = "ridgecrest-2019-clc-360.AT2"\npeak = "1.7085 m/s**2"\n', "", 1)
-    ds = run_study(study_of(text), workers=1)
-    with mpl.rc_context(STYLE):
-        figure = record_figure(cases_of(ds))
-    assert [ax._left_title.get_text().split()[0] for ax in figure.axes] == ["horizontal", "vertical"]
+def test_the_record_and_its_spectrum_are_those_of_the_first_case(quick_ds, figures):
+    check_record(figures["record"], cases_of(quick_ds).isel(case=0), ["x"])
+
+
+def test_both_directions_of_a_record_are_shown(both, figures):
+    check_record(figures["two directions"], cases_of(both).isel(case=0), ["x", "y"])
+
+
+def test_a_record_that_ends_early_is_shown_to_its_end():
+    ds = run_study(study_of(SHORT + '[sweep]\nduration = ["0.2 s", "0.4 s"]\n'), workers=1)
+    figure = record_figure(cases_of(ds))
+    assert figure.axes[0].get_xlim() == pytest.approx((0, 0.2), rel=1e-14)
 
 
 def test_the_mesh_names_its_points_and_layers(figures):
@@ -252,14 +399,16 @@ def check_colours(ax, case):
 
 def test_the_legend_names_every_state(figures):
     legend = figures["deformed"].legends[0]
-    assert [text.get_text() for text in legend.get_texts()] == [f"{state} joint" for state in JOINT_COLOURS]
+    assert legend.get_title().get_text() == "joint"
+    assert [text.get_text() for text in legend.get_texts()] == list(JOINT_COLOURS)
     for handle, colour in zip(legend.get_lines(), JOINT_COLOURS.values(), strict=True):
         assert same_color(handle.get_color(), colour)
 
 
 def test_joint_colours_differ_in_grey():
-    luminance = sorted(np.dot(mpl.colors.to_rgb(c), (0.299, 0.587, 0.114)) for c in JOINT_COLOURS.values())
-    assert min(np.diff(luminance)) > 0.15
+    """By a fifth of the way from black to white at least."""
+    assert set(JOINT_COLOURS) == set(JOINT_STATES)
+    assert min(np.diff(sorted(map(lightness, JOINT_COLOURS.values())))) >= 0.2
 
 
 def test_the_joint_is_drawn_without_gaps(figures, mixed):
@@ -275,22 +424,327 @@ def test_the_moment_shown_is_that_of_the_largest_racking(quick_ds, figures):
         assert f"t = {float(quick_ds['shape_time'][case]):.2f} s" in ax._left_title.get_text()
 
 
+# the joint in time -----------------------------------------------------------------------------------------------------------
+
+
+def check_contact(ax, case):
+    """Cells as high as the tributary lengths, one for every joint point and time, in the colours of their states."""
+    case = case.isel(joint=np.flatnonzero(np.isfinite(case["joint_arc"].values)))
+    (cells,) = ax.collections
+    corners = cells.get_coordinates()
+    length, arc, time = (case[name].values for name in ("joint_length", "joint_arc", "time"))
+    edges = corners[:, 0, 1]
+    np.testing.assert_allclose(edges, np.append(0, np.cumsum(length)), rtol=1e-14)
+    assert (edges[:-1] - 1e-9 <= arc).all()  # every point lies in its own cell [m]
+    assert (arc <= edges[1:] + 1e-9).all()
+    assert ax.get_ylim() == pytest.approx((0, length.sum()), rel=1e-14)
+    frames = corners[0, :, 0]
+    assert (frames[:-1] <= time).all()  # and every time in its own frame [s]
+    assert (time <= frames[1:]).all()
+    assert ax.get_xlim() == (0, time[-1])
+    state = case["joint_state"].transpose("joint", "time").values
+    shown = cells.get_array().reshape(state.shape)
+    np.testing.assert_array_equal(np.ma.getmaskarray(shown), state < 0)
+    for value in np.unique(state[state >= 0]):
+        for drawn in np.unique(shown[state == value].compressed()):
+            assert to_hex(cells.cmap(cells.norm(drawn))) == JOINT_COLOURS[JOINT_STATES[value]]
+    return state
+
+
+def check_sides(ax, case):
+    """Each side is named once, beside the middle of its part of the arc."""
+    names = {text.get_text(): text.get_position()[1] for text in ax.texts}
+    assert len(names) == len(ax.texts)
+    sides = case["joint_side"].values
+    ends = np.append(0, np.cumsum(case["joint_length"].values))
+    assert set(names) == set(sides[sides != ""])
+    for side, place in names.items():
+        on = np.flatnonzero(sides == side)
+        assert place == pytest.approx((ends[on[0]] + ends[on[-1] + 1]) / 2, rel=1e-12)
+
+
+def test_the_contact_is_that_of_the_cases_shown(quick_ds, figures):
+    cases = cases_of(quick_ds)
+    states = []
+    for ax, (case, name) in zip(figures["contact"].axes, SHOWN.items(), strict=True):
+        states.append(check_contact(ax, cases.isel(case=case)))
+        check_sides(ax, cases.isel(case=case))
+        assert ax._left_title.get_text() == name
+    assert set(np.unique(states)) == {0, 1, 2, 3}  # each state occurs
+
+
+def test_the_contact_of_one_case_has_no_title():
+    ds = cases_of(run_study(study_of(SHORT), workers=1))
+    figure = contact_figure(ds, _shown(ds, []))
+    (ax,) = figure.axes
+    check_contact(ax, ds.isel(case=0))
+    assert ax._left_title.get_text() == ""
+
+
+def test_the_legend_of_the_contact_names_every_state(figures):
+    (legend,) = figures["contact"].legends
+    assert [text.get_text() for text in legend.get_texts()] == list(JOINT_COLOURS)
+    for handle, colour in zip(legend.get_patches(), JOINT_COLOURS.values(), strict=True):
+        assert same_color(handle.get_facecolor(), colour)
+
+
+@pytest.mark.parametrize(
+    "sweep",
+    [
+        'quadrature = ["one-point", "nodal"]',
+        'box_width = ["5 m", "7.7 m"]',
+        'box_depth = ["0 m", "4 m"]',
+        'duration = ["0.2 s", "0.4 s"]',
+        'dt = ["10 ms", "4 ms"]',
+    ],
+    ids=["joint points", "boxes", "flush box", "ends that differ", "steps"],
+)
+def test_the_contact_of_a_sweep_is_that_of_each_case(sweep):
+    """Joint points that a case does not have leave no cell, times after its end are blank."""
+    cases = cases_of(run_study(study_of(f'{SHORT}[pressure]\np0 = "0.02 MPa"\n[sweep]\n{sweep}\n'), workers=1))
+    figure = contact_figure(cases, {0: "first", 1: "second"})
+    for i, ax in enumerate(figure.axes):
+        case = cases.isel(case=i)
+        state = check_contact(ax, case)
+        check_sides(ax, case.isel(joint=np.flatnonzero(np.isfinite(case["joint_arc"].values))))
+        assert (state < 0).any() == ("duration" in sweep and i == 0)
+
+
+def test_the_contact_of_a_failed_case_is_blank(failing_ds):
+    cases = cases_of(failing_ds)
+    figure = contact_figure(cases, {0: "done", 1: "failed"})
+    states = [check_contact(ax, cases.isel(case=i)) for i, ax in enumerate(figure.axes)]
+    assert (states[0] >= 0).all()
+    assert (states[1] < 0).all()
+
+
+# grids -----------------------------------------------------------------------------------------------------------------------
+
+
+def panels_of(figure, ds):
+    """The panels of a grid by row and column."""
+    names = [*axes_of(ds), "", ""]
+    columns = ds.sizes[names[2]] if names[2] else 1
+    return np.reshape(figure.axes, (-1, min(columns, 6)))
+
+
+@pytest.mark.parametrize(("n", "quantity"), [(2, "racking"), (3, "opening"), (4, "slip"), (5, "racking"), (6, "opening")])
+def test_each_axis_of_a_grid_has_its_place(n, quantity):
+    """x, curves, columns, rows; the further ones stand at their middle values, and are told."""
+    names = list(AXES)[:n]
+    ds = grid_of(names)
+    figure = grid_figure(ds, quantity)
+    values = {
+        "racking": ds["peak_racking"],
+        "opening": ds["max_opening"].max("joint"),
+        "slip": ds["max_slip"].max("joint"),
+    }[quantity]
+    values = values.isel({name: len(AXES[name][1]) // 2 for name in names[4:]})
+    panels = panels_of(figure, ds)
+    assert panels.shape == (5 if n > 3 else 1, 2 if n > 2 else 1)
+    for (row, column), ax in np.ndenumerate(panels):
+        place = {"scale": column, "domain_width": row}
+        here = values.isel({name: i for name, i in place.items() if name in names})
+        assert len(ax.lines) == 3
+        for curve, line in enumerate(ax.lines):
+            np.testing.assert_allclose(line.get_xdata(), [0.05, 0.2, 0.8, 3.2], rtol=1e-14)  # MPa
+            np.testing.assert_allclose(line.get_ydata(), 1e3 * here.isel(damping_ratio=curve), rtol=1e-14)  # mm
+        title = ["scale = 0.5", "scale = 1"][column] if row == 0 and n > 2 else ""
+        assert ax.get_title() == title
+        name = ["16 m", "20 m", "25 m", "31.25 m", "39 m"][row]
+        told = [" ".join(text.get_text().split()) for text in ax.texts]
+        assert told == ([f"domain width = {name}"] if n > 3 and column == 1 else [])
+    below, *fixed = figure._supxlabel.get_text().split("\n")
+    assert below == "$p_0$ [MPa]"
+    assert " ".join(fixed) == ", ".join(["box nu = 0.25", "layer 3 friction = 0.4"][: max(0, n - 4)])
+    assert figure._supylabel.get_text() == GRID_QUANTITIES[quantity][0]
+
+
+def test_the_legend_of_a_grid_names_each_curve_once(figures):
+    for name in ("grid of two", "grid of three", "grid of six"):
+        (legend,) = figures[name].legends
+        assert legend.get_title().get_text() == "damping ratio"
+        assert [text.get_text() for text in legend.get_texts()] == ["0.02", "0.05", "0.08"]
+        for handle, line in zip(legend.get_lines(), figures[name].axes[-1].lines, strict=True):
+            assert (handle.get_color(), handle.get_linestyle(), handle.get_marker()) == (
+                line.get_color(),
+                line.get_linestyle(),
+                line.get_marker(),
+            )
+
+
+def test_curves_of_a_grid_differ_in_dash_and_marker(figures):
+    lines = figures["grid of three"].axes[0].lines
+    assert len({(line.get_linestyle(), line.get_marker()) for line in lines}) == len(lines) == 3
+
+
+def test_failed_cases_are_gaps_in_a_grid():
+    """Also a panel all of whose cases failed; the axis still reaches the values at which cases failed."""
+    failed = np.zeros((4, 3, 2), dtype=bool)
+    failed[3], failed[1, 1, 0], failed[:, :, 1] = True, True, True
+    ds = grid_of(["p0", "damping_ratio", "scale"], **{q: np.where(failed, np.nan, 2.0) for q in GRID_QUANTITIES})
+    for quantity in GRID_QUANTITIES:
+        figure = grid_figure(ds, quantity)
+        for column, ax in enumerate(figure.axes):
+            for curve, line in enumerate(ax.lines):
+                np.testing.assert_array_equal(np.isnan(line.get_ydata()), failed[:, curve, column])
+        assert figure.axes[0].get_xlim()[1] >= 3.2
+
+
+@pytest.mark.parametrize(
+    ("values", "scale"),
+    [
+        ([0.1, 0.5, 0.9], "linear"),
+        ([0.1, 0.5, 1.1], "log"),
+        ([0.1, np.nan, 1.1], "log"),
+        ([0.0, 0.5, 2.0], "linear"),
+        ([1e-13, 0.5, 2.0], "linear"),
+        ([np.nan] * 3, "linear"),
+    ],
+    ids=["narrow", "wide", "wide with a gap", "with zero", "with the rounding of zero", "nothing"],
+)
+def test_wide_grids_are_logarithmic(values, scale):
+    """Above a factor of ten; but a zero, or what rounding makes of it, has no place on such an axis."""
+    figure = laid_out(lambda: grid_figure(grid_of(["p0", "damping_ratio"], racking=[values]), "racking"))
+    assert figure.axes[0].get_yscale() == scale
+    check_texts(figure)
+    assert not any("10^" in text.get_text() for text in seen(figure))  # numbers, not powers of ten
+
+
+def test_labels_of_a_logarithmic_grid_do_not_meet():
+    """Four rows and four columns, one and a half decades: 180 mm are narrow."""
+    axes = ["p0", "damping_ratio", "scale", "domain_width"]
+    ds = grid_of(
+        axes, scale=[0.5, 1, 2, 4], domain_width=[16, 20, 25, 31.25], racking=np.geomspace(0.02, 0.8, 4)[:, None, None, None]
+    )
+    figure = laid_out(lambda: grid_figure(ds, "racking"))
+    check_texts(figure)
+    shown = [text.get_text() for text in seen(figure)]
+    assert {"0.02", "0.05", "0.1", "0.2", "0.5"} <= set(shown)
+    assert shown.count("0.3") == 4  # under every column
+
+
+def test_of_many_values_as_many_are_shown_as_can_be_told_apart():
+    """The first and the last among them; the legend tells which, and nothing overlaps."""
+    many = {
+        "p0": [1e6, 2e6],
+        "damping_ratio": np.linspace(0.01, 0.2, 20),
+        "scale": np.arange(1.0, 31),
+        "domain_width": np.arange(20.0, 43),
+    }
+    racking = np.random.default_rng(7).uniform(1, 3, (2, 20, 30, 23))
+    ds = grid_of(["p0", "damping_ratio", "scale", "domain_width"], racking=racking, **many)
+    figure = laid_out(lambda: grid_figure(ds, "racking"))
+    check_texts(figure)
+    assert figure.get_figheight() < 250 / 25.4
+    panels = panels_of(figure, ds)
+    assert panels.shape == (6, 6)
+    titles = [float(ax.get_title().split(" = ")[1]) for ax in panels[0]]
+    rows = [float(ax.texts[0].get_text().split("= ")[1].split()[0]) for ax in panels[:, -1]]
+    assert (titles[0], titles[-1], rows[0], rows[-1]) == (1, 30, 20, 42)
+    curves = [float(text.get_text()) for text in figure.legends[0].get_texts()]
+    assert (len(curves), curves[0], curves[-1]) == (8, 0.01, 0.2)
+    last = ds["peak_racking"].sel(scale=titles[3], domain_width=rows[2]).isel(damping_ratio=-1)
+    np.testing.assert_allclose(panels[2, 3].lines[-1].get_ydata(), 1e3 * last, rtol=1e-14)
+
+
+def test_a_grid_of_lengths_and_pressures_is_legible():
+    """Pressures as curves have long names."""
+    ds = grid_of(
+        ["domain_width", "p0", "layer_3_friction"], p0=np.geomspace(123e3, 4.56e6, 8), layer_3_friction=[0.1, 0.2, 0.3, 0.4]
+    )
+    figure = laid_out(lambda: grid_figure(ds, "slip"))
+    check_texts(figure)
+    assert figure._supxlabel.get_text() == "domain width [m]"
+    assert [text.get_text() for text in figure.legends[0].get_texts()][::7] == ["0.123 MPa", "4.56 MPa"]
+
+
+# convergence -----------------------------------------------------------------------------------------------------------------
+
+
+def test_series_are_columns_with_changes_above_and_errors_below(sizes, figures):
+    ax = np.reshape(figures["convergence"].axes, (2, -1))
+    series = series_of(sizes)
+    assert [a.get_title() for a in ax[0]] == list(series) == ["width", "depth", "depth, record at base"]
+    assert [a.get_xlabel() for a in ax[1]] == ["width [m]", "depth [m]", "depth [m]"]
+    for column, chosen in zip(ax.T, series.values(), strict=True):
+        for a, what in zip(column, ("epsilon", "remaining_error"), strict=True):
+            assert a.get_yscale() == "log"
+            for line, measure in zip(a.lines, sizes["measure"].values, strict=False):
+                assert line.get_label() == measure
+                np.testing.assert_array_equal(line.get_xdata(), chosen["size"])
+                np.testing.assert_allclose(line.get_ydata(), 100 * chosen[what].sel(measure=measure), rtol=1e-14)
+            tolerance = a.lines[sizes.sizes["measure"]]
+            assert set(tolerance.get_ydata()) == {100 * sizes.attrs["domain_size_tolerance"]}
+    assert np.isfinite(ax[0, 0].lines[0].get_ydata()[1:]).all()  # there is something to see
+
+
+def test_what_is_never_certified_says_so(figures):
+    below = figures["convergence"].axes[3:]
+    assert [[text.get_text() for text in ax.texts] for ax in below] == [[], [], ["never certified"]]
+    assert all(np.isnan(line.get_ydata()).all() for line in below[2].lines[:8])
+
+
+def test_the_star_is_the_source_s(figures):
+    """At its width of 20 m, with its 2.16 % of displacement, in the colour of u_x at A."""
+    stars = {i: [line for line in ax.lines if line.get_marker() == "*"] for i, ax in enumerate(figures["convergence"].axes)}
+    assert [i for i, found in stars.items() if found] == [0]
+    (star,) = stars[0]
+    assert (star.get_xdata()[0], star.get_ydata()[0]) == (20.0, pytest.approx(2.16, rel=1e-12))
+    assert (SOURCE_SIZE[0], SOURCE_TOLERANCE) == (20.0, 0.0216)
+    assert same_color(star.get_color(), figures["convergence"].axes[0].lines[0].get_color())
+
+
+def test_the_legend_of_the_convergence_names_every_measure_once(sizes, figures):
+    (legend,) = figures["convergence"].legends
+    words = [text.get_text() for text in legend.get_texts()]
+    assert words == [*sizes["measure"].values, "tolerance", "u_x at A, the source's 2.16 %"]
+
+
+@pytest.mark.parametrize("name", ["width", "depth"])
+def test_one_direction_alone_is_drawn_too(name, sizes):
+    chosen = sizes.isel(domain=np.flatnonzero(sizes["series"].str.startswith(name)))
+    figure = convergence_figure(chosen)
+    titles = [ax.get_title() for ax in figure.axes if ax.get_title()]
+    assert titles == {"width": ["width"], "depth": ["depth", "depth, record at base"]}[name]
+
+
+def test_a_failed_size_is_a_gap_in_the_convergence(sizes):
+    lost = sizes.copy(deep=True)
+    for what in ("epsilon", "remaining_error"):
+        lost[what][1:3] = np.nan
+    figure = convergence_figure(lost)
+    assert np.isnan(figure.axes[0].lines[0].get_ydata()[1:3]).all()
+    for what in ("epsilon", "remaining_error"):
+        lost[what][:] = np.nan
+    check_texts(laid_out(lambda: convergence_figure(lost)))  # nothing but the tolerance is left
+
+
 # other studies ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("sweep", "names"),
     [
-        ("", NAMES[:4]),
-        ('[sweep]\nsides = ["tied", "roller", "fixed"]\n', NAMES[:4]),
-        ("[sweep]\nscale = [-1, 0, 1]\n", NAMES),
-        ('[sweep]\ndt = ["10 ms", "5 ms"]\nscale = [1, 2]\n', NAMES[:4]),
-        ('[sweep]\nduration = ["0.2 s", "0.3 s", "0.4 s"]\n', NAMES),
-        ('[sweep]\ndomain_width = ["15 m", "20 m", "30 m"]\n', NAMES),
-        ('[sweep]\nquadrature = ["one-point", "nodal"]\n', NAMES[:4]),
-        ('[sweep]\nbox_width = ["6 m", "5 m"]\nscale = [0.5, 1]\n', NAMES[:4]),
+        ("", NAMES),
+        ("[sweep]\nscale = [-1, 0, 1]\n", (*NAMES, "peaks")),
+        ('[sweep]\ndomain_width = ["15 m", "20 m", "30 m"]\n', (*NAMES, "peaks")),
+        ('[sweep]\ndt = ["10 ms", "5 ms"]\nbox_width = ["6 m", "5 m"]\n', (*NAMES, *GRID)),
+        ('[sweep]\nquadrature = ["one-point", "nodal"]\nduration = ["0.2 s", "0.4 s"]\n', NAMES),
+        ("[output]\nevery = 1000\n", ("mesh", "deformed")),
+        ('[output]\nevery = 30\n[sweep]\nduration = ["0.2 s", "0.4 s"]\n', NAMES),
+        ('[domain_size]\nwidth = { from = "12.8 m", num = 3 }\n', (*NAMES, "convergence")),
     ],
-    ids=["one case", "words", "negative", "two fields", "ends that differ", "domains", "joint points", "boxes"],
+    ids=[
+        "one case",
+        "negative",
+        "domains",
+        "steps and boxes",
+        "words, ends that differ",
+        "one time kept",
+        "one time of the first case kept",
+        "domain size",
+    ],
 )
 def test_figures_of_other_studies_as_read_from_their_files(sweep, names, tmp_path):
     write_dataset(run_study(study_of(SHORT + sweep), workers=1), tmp_path / "x.nc")
@@ -306,12 +760,12 @@ def test_figures_without_pressure_weight_and_motion(tmp_path):
     text += '[time]\ndt = "0.01 s"\nduration = "0.1 s"\n[gravity]\nself_weight = false\n[pressure]\np0 = 0\n'
     ds = run_study(study_of(text), workers=1)
     assert not ds["displacement"].any()
-    assert len(draw_all(ds, tmp_path / "x.nc")) == 4
+    assert [path.stem for path in draw_all(ds, tmp_path / "x.nc")] == [f"x-{name}" for name in NAMES]
 
 
 def test_failed_cases_are_not_drawn(failing_ds, tmp_path):
     files = draw_all(failing_ds, tmp_path / "x.nc")
-    assert [path.stem for path in files] == ["x-mesh", "x-record", "x-history", "x-deformed"]
+    assert [path.stem for path in files] == [f"x-{name}" for name in NAMES]
 
 
 def test_of_a_study_that_failed_throughout_the_mesh_is_drawn(failing_ds, tmp_path):

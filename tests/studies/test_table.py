@@ -5,7 +5,8 @@ import pytest
 
 from engine import Status
 from studies import run_study, sentences, table
-from studies.table import axes_of, cases_of, failures, in_words
+from studies.messages import in_words
+from studies.table import axes_of, cases_of, failures
 
 from .conftest import LOOSE, SHORT, study_of
 
