@@ -22,6 +22,7 @@ LATEST_TIME = 1e10
 """[s], with room for times that count from 1970."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?", re.ASCII)
+_ERROR_OF_A_SPREADSHEET = re.compile(r"#(N/A|NV|[A-ZÄÖÜ/0]+[!?])", re.IGNORECASE)
 _START_OF_NUMBER = re.compile(r"[+-]?\.?\d", re.ASCII)
 _NO_VALUE = {"na", "n/a", "nan", "null", "none", "inf", "infinity"}
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
@@ -43,7 +44,7 @@ def rows_of(name: str, lines: Sequence[str]) -> list[Row]:
     headers = 0
     for number, line in enumerate(lines, 1):
         text = _stripped(line)
-        if not text or text.startswith(COMMENT_SIGNS):
+        if not text or (text.startswith(COMMENT_SIGNS) and not (rows and _ERROR_OF_A_SPREADSHEET.match(text))):
             continue
         words = _SEPARATOR.split(text)
         if rows or not _is_header(text, words[0]):

@@ -31,6 +31,10 @@ def _factor(written: str, wanted: str) -> float:
     """What one `written` unit is in `wanted` units; ValueError where it is no such unit."""
     import pint
 
+    if re.match(r",\d", written):
+        raise ValueError("has a decimal comma; write a decimal point")
+    if re.match(r"\d{3}\b", written):
+        raise ValueError("holds two numbers; write one number without spaces, and a unit")
     if _NO_UNIT.search(written):
         raise ValueError(f"unit {written!r} is not known; must be a unit like {wanted}")
     try:

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from engine import PRESETS
 
@@ -29,6 +30,9 @@ from .table import axes_of, failures, sentences
 from .table import table as table_of
 
 DONE, SOME_FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+NARROW = 60
+"""Characters; on terminals narrower than this the summary is lines, not a table that would cut its numbers."""
 
 WIDEST_COLUMN = 30
 """Characters that a column of results may need; the table is as wide as its content, narrower terminals wrap its lines."""
@@ -107,7 +111,7 @@ def run_command(
         _tell(study, ds, lost)
         if figures:
             _draw(ds, path)
-    out.print(_summary(rows))
+    _sum_up(rows)
     raise typer.Exit(SOME_FAILED if failed else DONE)
 
 
@@ -144,6 +148,11 @@ def _load_all(names: list[str]) -> list[Study]:
 
 def _check_paths(paths: list[Path], sources: list[str]) -> None:
     wrong = [f"{path}: is a folder, must be a file" for path in paths if path.is_dir()]
+    wrong += [
+        f"{path}: is a device or a pipe, results would replace it"
+        for path in paths
+        if path.exists() and not (path.is_file() or path.is_dir())
+    ]
     places = [path.resolve() for path in paths]
     read = {Path(source).resolve() for source in sources}
     wrong += [f"{path}: is a study file, results would overwrite it" for path in paths if path.resolve() in read]
@@ -166,7 +175,7 @@ def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tupl
     start = time.perf_counter()
     total = sum(round(spec.time.duration / spec.time.dt) for spec in study.cases)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
@@ -200,7 +209,8 @@ def _finished(study: Study, path: Path) -> xr.Dataset | None:
 
 
 def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
-    out.print(f"\n[bold]{study.title}[/bold]")
+    out.print()
+    out.print(Text(study.title, style="bold"))
     for sentence in sentences(ds):
         out.print(sentence, markup=False)
     if is_domain_size(ds):
@@ -212,12 +222,21 @@ def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
         out.print(f"… and {len(lost) - 20} more; see status and reason in the file")
 
 
+def _sum_up(rows: list[tuple[str, ...]]) -> None:
+    if out.width >= NARROW:
+        out.print(_summary(rows))
+        return
+    for study, cases, lost, seconds, path in rows:
+        out.print(f"\n{study}: {cases} cases, {lost} failures, {seconds}", markup=False)
+        out.print(path, markup=False, soft_wrap=True)
+
+
 def _summary(rows: list[tuple[str, ...]]) -> Table:
     grid = Table(title="\nStudies", title_justify="left")
     for name, justify in (("study", "left"), ("cases", "right"), ("failures", "right"), ("wall time", "right"), ("file", "left")):
         grid.add_column(name, justify=justify, overflow="fold")  # type: ignore[arg-type]
     for row in rows:
-        grid.add_row(*row)
+        grid.add_row(*map(escape, row))
     return grid
 
 
@@ -226,7 +245,7 @@ def check(study: StudyName, workers: Workers = None) -> None:
     """Validate a study and say what would run, its size and warnings; run nothing."""
     (loaded,) = _load_all([study])
     advice = advise(loaded, workers or os.cpu_count() or 1)
-    out.print(f"[bold]{loaded.title}[/bold]")
+    out.print(Text(loaded.title, style="bold"))
     width = max(len(name) for name, _ in advice.facts)
     for name, value in advice.facts:
         out.print(f"{name:<{width}}  {value}", markup=False, soft_wrap=True)
@@ -237,8 +256,11 @@ def check(study: StudyName, workers: Workers = None) -> None:
 def _draw(ds: xr.Dataset, path: Path) -> None:
     from .plots import draw_all  # matplotlib is slow to import, and most commands draw nothing
 
-    for figure in draw_all(ds, path):
-        out.print(f"figure  {figure}", markup=False, soft_wrap=True)
+    try:
+        for figure in draw_all(ds, path):
+            out.print(f"figure  {figure}", markup=False, soft_wrap=True)
+    except OSError as error:
+        raise _refuse([f"{path.parent}: figures cannot be written: {error.strerror or error}"]) from None
 
 
 @app.command()
@@ -292,7 +314,9 @@ def list_command() -> None:
     for name in shipped_studies():
         study = load_study(name)
         out.print(
-            f"{name:<12}  {len(study.cases):>5} {'case ' if len(study.cases) == 1 else 'cases'}  {study.title}", markup=False
+            f"{name:<12}  {len(study.cases):>5} {'case ' if len(study.cases) == 1 else 'cases'}  {study.title}",
+            markup=False,
+            soft_wrap=True,
         )
 
 

@@ -1,6 +1,7 @@
 """From a study file to cases, and from cases to batches of lanes: TOML -> Study -> cases -> batches."""
 
 import json
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -94,10 +95,19 @@ def load_study(source: str | Path) -> Study:
         if _depth(table) > MOST_NESTED:
             raise RecursionError
     except tomllib.TOMLDecodeError as error:
-        raise StudyError([f"{path.name}: is not valid TOML: {error}"]) from None
+        raise StudyError([f"{path.name}: is not valid TOML: {error}{_quotes(text, str(error))}"]) from None
     except RecursionError:
         raise StudyError([f"{path.name}: is nested too deeply for a study"]) from None
     return make_study(table, path.stem, text, path.parent, path.name)
+
+
+def _quotes(text: str, error: str) -> str:
+    """What may be wrong with the line that TOML complains of: a quantity without quotes, a decimal comma."""
+    lines, found = text.splitlines(), re.search(r"line (\d+)", error)
+    line = lines[min(int(found[1]), len(lines)) - 1] if found and lines else ""
+    if re.search(r"=\s*[-+]?\d+,\d", line):
+        return "; write decimal points"
+    return '; quantities and words stand in quotes, as in "5 m"' if re.search(r"=\s*[^\s\"'\[{#]+\s*[^\W\d]", line) else ""
 
 
 def _depth(table: Any) -> int:
@@ -142,6 +152,13 @@ def make_study(table: dict[str, Any], name: str = "study", text: str = "", folde
         mistakes.append(f"title = {shown(title)}: must be text in quotes")
     base = _base(table, mistakes)
     sizes = _sizes(table, mistakes)
+    if (
+        sizes
+        and sizes.depth
+        and sizes.depth.start < (at := (base or Spec()).motion.reference_depth or (base or Spec()).domain.depth)
+    ):
+        mistakes.append(f"domain_size.depth.from = {sizes.depth.start:g} m: must not lie above the record, which is at {at:g} m")
+        sizes = None
     axes = [domain_axis(sizes, base or Spec())] if sizes else swept_axes(table.get("sweep", {}), mistakes)
     cases = _cases(base or Spec(), axes, mistakes, only_values=base is None)
     motions = _motions(_records(table, base, cases), folder or Path(), mistakes)
@@ -269,7 +286,7 @@ def _motions(records: dict[str, tuple[str, set[Said]]], folder: Path, mistakes: 
             for dt, unit in said:
                 motions[name] = read_record(path, dt, unit)
         except MotionError as error:
-            mistakes.append(f"motion.{field} = {shown(name)}: {error}")
+            mistakes.append(f"motion.{field} = {shown(name)}: {str(error).removeprefix(f'{Path(name).name}: ')}")
     return motions
 
 

@@ -235,7 +235,7 @@ def uplift_over_weight(spec: Spec) -> float:
 
 def write_dataset(ds: xr.Dataset, path: Path) -> None:
     """Write a netCDF-4 file: under another name first, flushed to disk, then renamed, so that it is whole or not there."""
-    part = path.with_name(path.name + ".part")
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # two runs into one file: the last one's stays
     path.parent.mkdir(parents=True, exist_ok=True)
     numeric = [name for name in ds.data_vars if ds[name].dtype.kind == "f" and ds[name].ndim]
     try:
@@ -243,5 +243,7 @@ def write_dataset(ds: xr.Dataset, path: Path) -> None:
         with part.open("rb+") as file:
             os.fsync(file.fileno())
         part.replace(path)
+    except RuntimeError as error:  # as netCDF4 tells of a full disk
+        raise OSError(f"{error}; is the disk full?") from None
     finally:
         part.unlink(missing_ok=True)

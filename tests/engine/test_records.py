@@ -316,6 +316,8 @@ TWO = "\n".join(f"{t} {a}" for t, a in zip(TIMES, WRITTEN, strict=True))
         ("0.00 1\n0.01 1_0\n", UNIT, "line 2: '1_0' is not a number"),
         ("0.00 1\n0.01 ٣\n", UNIT, "line 2: '٣' is not a number"),
         ("nan\n1\n2\n", BOTH, "line 1: 'nan' is not a number"),
+        ("1\n#N/A\n2\n", BOTH, "line 2: '#N/A' is not a number"),
+        ("1\n#DIV/0!\n2\n", BOTH, "line 2: '#DIV/0!' is not a number"),
         ("NA\n1\n2\n", BOTH, "line 1: 'NA' is not a number"),
         ("****\n1\n2\n", BOTH, r"line 1: '\*\*\*\*' is not a number"),
         ("0.00 abc\n0.01 1\n0.02 2\n", UNIT, "line 1: 'abc' is not a number"),

@@ -79,11 +79,15 @@ def test_wrong_unit_is_refused_and_the_right_one_named(written, unit):
     assert written.split(" ", 1)[1] in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "written", ["20 flurbs", "1,5 m", "1 000 m", "1_000 m", "0x10 m", "3 2*m", "3 m+m", "3 __import__('os')", "3 m**", "3 ()"]
-)
+@pytest.mark.parametrize("written", ["20 flurbs", "1_000 m", "0x10 m", "3 2*m", "3 m+m", "3 __import__('os')", "3 m**", "3 ()"])
 def test_unknown_unit_is_refused(written):
     with pytest.raises(ValueError, match="is not known; must be a unit like m"):
+        in_si(written, "m", unit_required=True)
+
+
+@pytest.mark.parametrize(("written", "rule"), [("1,5 m", "write a decimal point"), ("1 000 m", "without spaces")])
+def test_commas_and_spaces_in_numbers_are_told(written, rule):
+    with pytest.raises(ValueError, match=rule):
         in_si(written, "m", unit_required=True)
 
 

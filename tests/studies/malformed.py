@@ -34,7 +34,7 @@ FILES = [
     bad("wrong unit", '[pressure]\np0 = "2 cm"', ("pressure.p0", '"2 cm"', "must be a quantity in Pa")),
     bad("unknown unit", '[pressure]\np0 = "2 xyz"', ("pressure.p0", '"2 xyz"', "not known; must be a unit like Pa")),
     bad("no number", '[pressure]\np0 = "high"', ("pressure.p0", '"high"', "must be a number and a unit")),
-    bad("decimal comma", '[box]\nwall = "0,5 m"', ("box.wall", '"0,5 m"', "unit")),
+    bad("decimal comma", '[box]\nwall = "0,5 m"', ("box.wall", '"0,5 m"', "write a decimal point")),
     bad("boolean for a quantity", "[pressure]\np0 = true", ("pressure.p0", "true", "must be a number with a unit")),
     bad(
         "list for a quantity",
@@ -238,7 +238,7 @@ FILES = [
     bad("velocity for a peak", '[motion]\npeak = "20 cm/s"', ("motion.peak", '"20 cm/s"', "must be a quantity in m/s**2")),
     bad("unit in small letters", '[box]\nE = "34 gpa"', ("box.E", '"34 gpa"', "not known; must be a unit like Pa")),
     bad("sum for a quantity", '[box]\nE = "1 Pa + 2 Pa"', ("box.E", '"1 Pa + 2 Pa"', "not known")),
-    bad("spaces in a number", '[box]\nE = "34 000 MPa"', ("box.E", '"34 000 MPa"', "not known")),
+    bad("spaces in a number", '[box]\nE = "34 000 MPa"', ("box.E", '"34 000 MPa"', "write one number without spaces")),
     bad("two signs", '[box]\nE = "--1 Pa"', ("box.E", '"--1 Pa"', 'must be a number and a unit, as in "2.5 Pa"')),
     bad("empty quantity", '[box]\nE = ""', ("box.E", '""', "must be a number and a unit")),
     bad("temperature", '[box]\nE = "5 degC"', ("box.E", '"5 degC"', "must be a quantity in Pa")),

@@ -123,8 +123,8 @@ def test_an_accidental_small_change_is_no_stop():
     ds = judged([1, 2, 2.001, 3, 3.001, 3.0015])
     (said,) = convergence_sentences(ds)
     assert said == (
-        "In width, to 2.16 % of u_x at A: the method stops at 15.6 m with 0.05 %, "
-        "but 19.5 m changes it by 33.3 % again: not settled."
+        "In width, to 2.16 % of u_x at A: the method stops at 15.62 m with 0.05 %, "
+        "but 19.53 m changes it by 33.3 % again: not settled."
     )
     np.testing.assert_array_equal(ds["within_tolerance"].sel(measure="racking"), [0, 0, 0, 0, 1, 1])
 
@@ -134,14 +134,14 @@ def test_a_stop_that_holds_comes_with_the_error_that_remains():
     (said,) = convergence_sentences(judged(list(m), tolerance=0.05))
     k = int(np.argmax(np.abs(np.diff(m)) / m[1:] <= 0.05)) + 1
     assert said == (
-        f"In width, to 5 % of u_x at A: the method stops at {WIDTHS[k]:.3g} m with {100 * (m[k - 1] - m[k]) / m[k]:.3g} %; "
+        f"In width, to 5 % of u_x at A: the method stops at {WIDTHS[k]:.4g} m with {100 * (m[k - 1] - m[k]) / m[k]:.3g} %; "
         f"remaining error there: {100 * (m[k] - 3) / m[k]:.3g} %."
     )
 
 
 def test_no_size_is_enough():
     (said,) = convergence_sentences(judged([1, 2, 4]))
-    assert said == "In width, to 2.16 % of u_x at A: no size up to 15.6 m is enough, the last one still changes it by 50 %."
+    assert said == "In width, to 2.16 % of u_x at A: no size up to 15.62 m is enough, the last one still changes it by 50 %."
 
 
 def test_as_the_source_does_it_nothing_is_certified():
@@ -209,7 +209,7 @@ def test_the_record_at_the_base_and_at_its_depth_march_in_one_batch():
         ({"width": {"from": "12.8 m", "num": 4}, "measure": "joy"}, 'domain_size.measure = "joy": must be'),
         ({"height": {"from": "12.8 m", "num": 4}}, "domain_size.height: is not a field"),
         ({"width": {"from": "4 m", "num": 3}}, "domain_size: box.width = 5 m: box must lie inside domain.width = 4 m"),
-        ({"depth": {"from": "10 m", "num": 3}}, "domain_size: motion.reference_depth = 14 m: must not lie below the base"),
+        ({"depth": {"from": "10 m", "num": 3}}, "domain_size.depth.from = 10 m: must not lie above the record, which is at 14 m"),
     ],
 )
 def test_mistakes_are_told_in_a_line(table, told):

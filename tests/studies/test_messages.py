@@ -65,7 +65,7 @@ def test_a_broken_record_is_one_line_of_file_field_value_reason(case, tmp_path):
             b"[box]\nwidth = 5 m",
             "is not valid TOML: Expected newline or end of document after a statement (at line 2, column 11)",
         ),
-        (b"[box]\nwidth = 5,5", "is not valid TOML"),
+        (b"[box]\nwidth = 5,5", "; write decimal points"),
         (b'[box]\nwidth = "5 m', "is not valid TOML: Unterminated string"),
         (b"[box\nwidth = 5", "is not valid TOML: Expected ']'"),
         (b'[sweep]\np0 = ["1 Pa" "2 Pa"]', "is not valid TOML: Unclosed array"),

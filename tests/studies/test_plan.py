@@ -366,12 +366,12 @@ def test_a_missing_record_is_told_with_what_there_is():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('record = "column.txt"\nrecord_unit = "Gal"', 'column.txt": column.txt: a record of one column needs motion.record_dt'),
-        ('record = "table.csv"', 'record = "table.csv": table.csv: a record of columns of text needs motion.record_unit'),
+        ('record = "column.txt"\nrecord_unit = "Gal"', 'column.txt": a record of one column needs motion.record_dt'),
+        ('record = "table.csv"', 'record = "table.csv": a record of columns of text needs motion.record_unit'),
         ('record_unit = "Gal"', "is a PEER record and states its own time step and unit; leave out motion.record_unit"),
         (
             'vertical_record = "table.csv"\nrecord = "none"\nrecord_unit = "Gal"\nrecord_dt = "0.01 s"',
-            'motion.vertical_record = "table.csv": table.csv: its times step by 0.02 s, motion.record_dt says 0.01 s',
+            'motion.vertical_record = "table.csv": its times step by 0.02 s, motion.record_dt says 0.01 s',
         ),
         (
             'record = "column.txt"\nrecord_unit = "g_0"\nrecord_dt = "0.01 s"',
