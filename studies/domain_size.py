@@ -96,10 +96,10 @@ def with_convergence(ds: xr.Dataset, sizes: DomainSizes) -> xr.Dataset:
     As the source grows the depth nothing is certified: a deeper base under the same record is another problem.
     """
     found = {name: np.full((ds.sizes["domain"], len(MEASURES)), np.nan) for name in _TEXTS}
-    for name in dict.fromkeys(ds["series"].values):
+    for name, chosen in series_of(ds).items():
         rows = np.flatnonzero(ds["series"].values == name)
-        size = ds[WIDTH if name == WIDTH else DEPTH].values[rows]
-        result = convergence(measured(ds.isel(domain=rows)), size[1] / size[0])
+        size = chosen["size"].values
+        result = convergence(measured(chosen), size[1] / size[0])
         found["epsilon"][rows] = result.epsilon
         within = result.epsilon <= sizes.tolerance
         found["within_tolerance"][rows] = np.logical_and.accumulate(within[::-1])[::-1]

@@ -172,7 +172,7 @@ def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress |
     """March one batch with its free field, and gather what the dataset holds of it."""
     model = build_model(specs[0])
     depths = [_depth_of_the_record(spec) for spec in specs]
-    motions = [_at_the_base(model, motion, depth) for motion, depth in zip(motions, depths, strict=True)]
+    motions = _at_the_base(model, motions, depths)
     told = 0
 
     def tell(step: int) -> None:
@@ -205,8 +205,8 @@ def trace_case(study: Study, case: int, tell: Callable[[Trace, Model], None]) ->
     """March one case by itself and tell every step of it; how it ended, and why where it failed."""
     spec = study.cases[case]
     model = build_model(spec)
-    motion = _at_the_base(model, study.ground(case), _depth_of_the_record(spec))
-    response = simulate_cases(model, [spec], [motion], trace=lambda step: tell(step, model))
+    motions = _at_the_base(model, [study.ground(case)], [_depth_of_the_record(spec)])
+    response = simulate_cases(model, [spec], motions, trace=lambda step: tell(step, model))
     return Status(response.status[0]), response.reason[0]
 
 
@@ -220,9 +220,15 @@ def _depth_of_the_record(spec: Spec) -> float:
     return spec.motion.reference_depth or spec.domain.depth
 
 
-def _at_the_base(model: Model, motion: np.ndarray, depth: float) -> np.ndarray:
-    """The base motion that moves the free field at `depth` as `motion`."""
-    return motion if depth == model.spec.domain.depth else carried_down(model, [motion], depth)[0]
+def _at_the_base(model: Model, motions: list[np.ndarray], depths: list[float]) -> list[np.ndarray]:
+    """The base motions that move the free field as `motions` at the depth of each; the modes of a depth are found once."""
+    found = list(motions)
+    for depth in dict.fromkeys(depths):
+        if depth != model.spec.domain.depth:
+            lanes = [lane for lane, other in enumerate(depths) if other == depth]
+            for lane, base in zip(lanes, carried_down(model, [motions[lane] for lane in lanes], depth), strict=True):
+                found[lane] = base
+    return found
 
 
 def uplift_over_weight(spec: Spec) -> float:
