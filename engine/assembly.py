@@ -83,10 +83,11 @@ class Constraints:
 class JointPoints:
     """Where the joint law is evaluated.
 
-    nodes : (n_point, 4) corners of the joint element; shape : (n_point, 4) N with sign, structure minus ground (D2)
+    nodes : (n_point, 4 or 6) of the joint element; shape : as nodes, N with sign, structure minus ground (D2)
     normal : (n_point, 2) from the ground into the structure
     area : (n_point,) tributary length times thickness; length, arc : (n_point,) tributary and arc length
     place : (n_point, 2); material : (n_point,) joint material
+    parts : (n_part, 2) joint element and point, one for each point that an element has a part in; part_lengths : (n_part,)
     """
 
     nodes: Ints
@@ -97,6 +98,8 @@ class JointPoints:
     arc: Floats
     place: Floats
     material: Ints
+    parts: Ints
+    part_lengths: Floats
 
     def __len__(self) -> int:
         return len(self.area)
@@ -113,13 +116,14 @@ class System:
 
     mesh: Mesh
     thickness: float
+    lumped: bool
+    materials: tuple[Material, ...]
     points: JointPoints
     joint_materials: tuple[JointMaterial, ...]
     expand: sp.csr_array
     K: sp.csr_array
     M: sp.csr_array
     B: sp.csr_array
-    stress: sp.csr_array
     inertia: Floats
     weight: Floats
     n_interior: int
@@ -142,15 +146,22 @@ class System:
         return sp.csr_array(self.K + self.B.T @ sp.diags_array(np.column_stack([k_n, k_s]).ravel()) @ self.B)
 
     def pressure_load(self, nodal_pressure: Floats) -> Floats:
-        """Load (n_dof,) of a pressure (n_node,), linear along every pressure edge, pushing to its left: f1 = L (2 p1 + p2)/6."""
-        edges, nodes = self.mesh.pressure_edges, self.mesh.nodes
-        along = nodes[edges[:, 1]] - nodes[edges[:, 0]]
-        inward = np.column_stack([-along[:, 1], along[:, 0]]) * self.thickness
-        p1, p2 = nodal_pressure[edges[:, 0]], nodal_pressure[edges[:, 1]]
-        full = np.zeros((len(nodes), 2))
-        np.add.at(full, edges[:, 0], inward * ((2 * p1 + p2) / 6)[:, None])
-        np.add.at(full, edges[:, 1], inward * ((p1 + 2 * p2) / 6)[:, None])
-        return self.expand.T @ full.ravel()
+        """Load (n_dof,) of a pressure (n_node,) pushing to the left of every pressure edge, f_i = ∫ N_i p n h ds."""
+        return self.expand.T @ pressure_forces(self.mesh, nodal_pressure, self.mesh.pressure_edges, self.thickness).ravel()
+
+    def stress_rows(self, triangles: Ints, places: Floats) -> sp.csr_array:
+        """(4 n, n_dof): xx, yy, xy, zz at one barycentric place (n, 3) in each of n triangles."""
+        solids = self.solids(triangles)
+        S = np.empty((len(triangles), 4, 2 * self.mesh.triangles.shape[1]))
+        triangle.all_stress_matrices(solids, np.ascontiguousarray(places, dtype=float), S)
+        row = np.broadcast_to(np.arange(S.shape[0] * 4).reshape(-1, 4, 1), S.shape)
+        column = np.broadcast_to(_element_dofs(solids.triangles)[:, None, :], S.shape)
+        shape = (4 * len(triangles), 2 * len(self.mesh.nodes))
+        return _sorted(sp.csr_array(sp.coo_array((S.ravel(), (row.ravel(), column.ravel())), shape=shape)) @ self.expand)
+
+    def solids(self, triangles: Ints) -> triangle.Solids:
+        """Chosen triangles with their materials, as the kernels take them."""
+        return solids_of(self.mesh, self.materials, self.thickness, triangles)
 
     def nodal(self, u: Floats) -> Floats:
         """Displacement of every node, (n_node, 2), of one lane's u (n_dof,)."""
@@ -174,22 +185,27 @@ def build_system(
         raise MeshError(f"joint_material: names {mesh.joint_material.max()}, there are {len(joint_materials)} joint materials")
     held = constraints or Constraints.free(mesh)
     points = joint_points(mesh, quadrature, thickness)
-    stiffness, mass, stress = _element_matrices(mesh, materials, thickness, lumped)
+    if lumped and mesh.order == 2:
+        raise MeshError("lumped: six-node triangles have no lumped mass, their row sums leave the corners without any")
+    if quadrature == "one-point" and mesh.order == 2:
+        raise MeshError("quadrature: one point cannot hold a joint of six nodes; take nodal")
+    stiffness, mass = element_matrices(solids_of(mesh, materials, thickness), lumped)
     expand, n_interior = _numbering(mesh, points, held)
-    K, M = (expand.T @ _scatter(mesh, blocks) @ expand for blocks in (stiffness, mass))
-    full_mass = _scatter(mesh, mass)
+    full_stiffness, full_mass = (scatter(len(mesh.nodes), mesh.triangles, blocks) for blocks in (stiffness, mass))
+    K, M = (expand.T @ full @ expand for full in (full_stiffness, full_mass))
     unit = np.tile(np.eye(2), (len(mesh.nodes), 1))
     inertia = (expand.T @ (full_mass @ unit)).T
     return System(
         mesh=mesh,
         thickness=thickness,
+        lumped=lumped,
+        materials=tuple(materials),
         points=points,
         joint_materials=tuple(joint_materials),
         expand=expand,
         K=_sorted(K),
         M=_sorted(M),
-        B=_sorted(_joint_operator(points, len(mesh.nodes)) @ expand),
-        stress=_sorted(_stress_operator(mesh, stress) @ expand),
+        B=_sorted(joint_operator(points, len(mesh.nodes)) @ expand),
         inertia=np.ascontiguousarray(inertia),
         weight=expand.T @ (full_mass @ np.tile([0.0, -1.0], len(mesh.nodes))),
         n_interior=n_interior,
@@ -209,75 +225,124 @@ def _sorted(matrix: sp.sparray) -> sp.csr_array:
     return result
 
 
-def _element_matrices(mesh: Mesh, materials: Sequence[Material], thickness: float, lumped: bool) -> tuple[Floats, Floats, Floats]:
-    """Stiffness and mass (n, 6, 6) and stress matrices (n, 3, 6) of all triangles."""
-    E, nu, rho = (np.array([getattr(materials[i], name) for i in mesh.material], dtype=float) for name in ("E", "nu", "rho"))
-    n = len(mesh.triangles)
-    K, m, S = np.empty((n, 6, 6)), np.empty((n, 3, 3)), np.empty((n, 3, 6))
-    triangle.all_matrices(mesh.nodes, mesh.triangles, E, nu, rho, float(thickness), lumped, K, m)
-    triangle.all_stress_matrices(mesh.nodes, mesh.triangles, E, nu, S)
-    return K, np.einsum("nij,ab->niajb", m, np.eye(2)).reshape(n, 6, 6), S
+def pressure_forces(mesh: Mesh, nodal_pressure: Floats, edges: Ints, thickness: float) -> Floats:
+    """Nodal forces (n_node, 2) of a pressure (n_node,) that is interpolated along edges and pushes to their left."""
+    forces = np.zeros((len(mesh.nodes), 2))
+    for place, weight in zip(_GAUSS_PLACES, _GAUSS_WEIGHTS, strict=True):
+        N, slope = _side_shape(place, mesh.order)
+        along = np.einsum("i,eic->ec", slope, mesh.nodes[edges])
+        push = weight * thickness * (nodal_pressure[edges] @ N)[:, None] * np.column_stack([-along[:, 1], along[:, 0]])
+        np.add.at(forces, edges, N[:, None] * push[:, None, :])
+    return forces
+
+
+_GAUSS_PLACES = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))
+_GAUSS_WEIGHTS = (5 / 18, 8 / 18, 5 / 18)
+"""Three points on a side from 0 to 1, exact to degree 5: quadratic pressure on curved sides."""
+
+
+def _side_shape(place: float, order: int) -> tuple[Floats, Floats]:
+    """Shape functions (2 or 3,) of a side at a place from 0 to 1, and their derivatives: ends first, then the middle."""
+    if order == 1:
+        return np.array([1 - place, place]), np.array([-1.0, 1.0])
+    N = [(1 - place) * (1 - 2 * place), place * (2 * place - 1), 4 * place * (1 - place)]
+    return np.array(N), np.array([4 * place - 3, 4 * place - 1, 4 - 8 * place])
+
+
+def solids_of(mesh: Mesh, materials: Sequence[Material], thickness: float, chosen: Ints | slice = slice(None)) -> triangle.Solids:
+    """Triangles of a mesh with their materials, as the kernels take them; all of them by default."""
+    of = [materials[i] for i in mesh.material[chosen]]
+    E, nu, rho = (np.array([getattr(material, name) for material in of], dtype=float) for name in ("E", "nu", "rho"))
+    return triangle.Solids(mesh.nodes, mesh.triangles[chosen].copy(), E, nu, rho, float(thickness))
+
+
+def element_matrices(solids: triangle.Solids, lumped: bool = False) -> tuple[Floats, Floats]:
+    """Stiffness and mass (n_triangle, 2n, 2n) of triangles with n nodes."""
+    count, n = solids.triangles.shape
+    K, m = np.empty((count, 2 * n, 2 * n)), np.empty((count, n, n))
+    triangle.all_matrices(solids, lumped, K, m)
+    return K, np.einsum("nij,ab->niajb", m, np.eye(2)).reshape(K.shape)
 
 
 def _element_dofs(triangles: Ints) -> Ints:
     return (2 * triangles[:, :, None] + np.arange(2)).reshape(len(triangles), -1)
 
 
-def _scatter(mesh: Mesh, blocks: Floats) -> sp.csr_array:
-    """Sum of element blocks (n, 6, 6) over all nodes."""
-    dofs = _element_dofs(mesh.triangles)
+def scatter(n_node: int, triangles: Ints, blocks: Floats) -> sp.csr_array:
+    """Sum of the blocks (n, 2n, 2n) of triangles over all degrees of freedom (2 n_node, 2 n_node)."""
+    dofs = _element_dofs(triangles)
     row, column = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
-    size = 2 * len(mesh.nodes)
+    size = 2 * n_node
     return sp.csr_array(sp.coo_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=(size, size)))
 
 
-def _stress_operator(mesh: Mesh, S: Floats) -> sp.csr_array:
-    """(3 n_triangle, 2 n_node): xx, yy, xy of every triangle."""
-    n = len(mesh.triangles)
-    row = np.broadcast_to(np.arange(3 * n).reshape(n, 3, 1), (n, 3, 6))
-    column = np.broadcast_to(_element_dofs(mesh.triangles)[:, None, :], (n, 3, 6))
-    return sp.csr_array(sp.coo_array((S.ravel(), (row.ravel(), column.ravel())), shape=(3 * n, 2 * len(mesh.nodes))))
+_NODAL = {1: ((0.0, 1 / 2), (1.0, 1 / 2)), 2: ((0.0, 1 / 6), (0.5, 4 / 6), (1.0, 1 / 6))}
+"""Places along a joint from 0 to 1 and their shares of its length: at its nodes, by Lobatto's rules of two and three points."""
 
 
 def joint_points(mesh: Mesh, quadrature: Quadrature, thickness: float) -> JointPoints:
-    """Points of all joints: two at the nodes of each (Lobatto) or one in its middle (D2).
+    """Points of all joints: at the nodes of each (Lobatto) or one in its middle (D2).
 
     Points of neighbours at one node pair are one where normal and material agree; a corner or a layer boundary keeps two (D3).
     """
-    start, end = mesh.nodes[mesh.joints[:, 0]], mesh.nodes[mesh.joints[:, 1]]
-    length = np.linalg.norm(end - start, axis=1)
-    along = (end - start) / np.where(length > 0, length, 1.0)[:, None]
-    normal = np.column_stack([-along[:, 1], along[:, 0]])
-    before = np.concatenate([[0.0], np.cumsum(length)[:-1]]) if len(length) else length
-    found: dict[tuple, tuple[int, float, float]] = {}
-    tributary: dict[tuple, float] = {}
-    for e in range(len(mesh.joints)):
-        places = [(0.5, 1.0)] if quadrature == "one-point" else [(0.0, 0.5), (1.0, 0.5)]
-        for position, share in places:
-            pair = (
-                (e,)
-                if quadrature == "one-point"
-                else tuple(mesh.joints[e][[0, 3]] if position == 0.0 else mesh.joints[e][[1, 2]])
-            )
-            key = (pair, int(mesh.joint_material[e]), *np.round(normal[e], 9))
-            found.setdefault(key, (e, position, before[e] + position * length[e]))
-            tributary[key] = tributary.get(key, 0.0) + share * length[e]
-    elements = np.array([e for e, _, _ in found.values()], dtype=np.int64)
-    part, arc = (np.array([point[i] for point in found.values()], dtype=float) for i in (1, 2))
-    own_length = np.array(list(tributary.values()), dtype=float)
+    rule = _NODAL[mesh.order] if quadrature == "nodal" else ((0.5, 1.0),)
+    sides = _joint_sides(mesh)
+    N, slopes = (np.array(of) for of in zip(*(_side_shape(place, mesh.order) for place, _ in rule), strict=True))
+    tangent = np.einsum("qi,eic->eqc", slopes, mesh.nodes[sides])
+    stretch = np.linalg.norm(tangent, axis=2)
+    normal = np.stack([-tangent[..., 1], tangent[..., 0]], axis=2) / np.where(stretch > 0, stretch, 1.0)[..., None]
+    element, place, point = _merged(mesh, normal, [_PAIRS[place] for place, _ in rule] if quadrature == "nodal" else None)
+    lengths = stretch * [share for _, share in rule]
+    arc = np.cumsum(lengths.sum(axis=1))[:, None] + lengths.sum(axis=1)[:, None] * [place - 1 for place, _ in rule]
+    _, first = np.unique(point, return_index=True)
+    e, q = element[first], place[first]
+    own_length: Floats = np.zeros(len(first))
+    np.add.at(own_length, point, lengths[element, place])
     return JointPoints(
-        nodes=mesh.joints[elements].reshape(-1, 4),
-        shape=np.column_stack([part - 1, -part, part, 1 - part]),
-        normal=normal[elements].reshape(-1, 2),
+        nodes=mesh.joints[e].reshape(-1, 2 + 2 * mesh.order),
+        shape=_opening(N)[q],
+        normal=normal[e, q],
         area=own_length * thickness,
         length=own_length,
-        arc=arc,
-        place=(start[elements] + part[:, None] * (end - start)[elements]).reshape(-1, 2),
-        material=mesh.joint_material[elements],
+        arc=arc[e, q],
+        place=np.einsum("pi,pic->pc", N[q], mesh.nodes[sides[e]]),
+        material=mesh.joint_material[e],
+        parts=np.column_stack([element, point]),
+        part_lengths=lengths[element, place],
     )
 
 
-def _joint_operator(points: JointPoints, n_node: int) -> sp.csr_array:
+_PAIRS = {0.0: [0, 3], 1.0: [1, 2], 0.5: [4, 5]}
+"""Columns of a joint's nodes that lie over each other, by place."""
+
+
+def _merged(mesh: Mesh, normal: Floats, pairs: list[list[int]] | None) -> tuple[Ints, Ints, Ints]:
+    """Joint element, place in it and point of every part; points are numbered in the order in which they are met.
+
+    normal : (n_joint, n_place, 2); pairs : columns of the nodes at every place, none where places are not at nodes
+    """
+    found: dict[tuple, int] = {}
+    element, place = (index.ravel() for index in np.indices(normal.shape[:2]))
+    point = np.zeros(len(element), dtype=np.int64)
+    for part, (e, q) in enumerate(zip(element.tolist(), place.tolist(), strict=True)):
+        where = mesh.joints[e][pairs[q]].tolist() if pairs else [e]
+        key = (*where, int(mesh.joint_material[e]), *np.round(normal[e, q], 9).tolist())
+        point[part] = found.setdefault(key, len(found))
+    return element, place, point
+
+
+def _joint_sides(mesh: Mesh) -> Ints:
+    """Nodes of the joints' ground side (n_joint, 2 or 3): ends first, then the middle."""
+    return mesh.joints.reshape(-1, 2 + 2 * mesh.order)[:, [0, 1, 4][: 1 + mesh.order]]
+
+
+def _opening(N: Floats) -> Floats:
+    """Shape functions (n, 2 or 3) of a side, for all nodes of a joint (n, 4 or 6): minus on the ground, plus on the structure."""
+    ends = np.column_stack([-N[:, 0], -N[:, 1], N[:, 1], N[:, 0]])
+    return ends if N.shape[1] == 2 else np.column_stack([ends, -N[:, 2], N[:, 2]])
+
+
+def joint_operator(points: JointPoints, n_node: int) -> sp.csr_array:
     """(2 n_point, 2 n_node): normal and tangential gap of every point; the tangent is the normal turned by -90°."""
     n = len(points)
     axes = np.stack([points.normal, np.column_stack([points.normal[:, 1], -points.normal[:, 0]])], axis=1)
@@ -300,8 +365,9 @@ def _numbering(mesh: Mesh, points: JointPoints, held: Constraints) -> tuple[sp.c
     column = np.where(fixed, -1, column[owner])
     chosen = np.flatnonzero(column >= 0)
     expand = sp.csr_array((np.ones(len(chosen)), (chosen, column[chosen])), shape=(2 * n, len(free)))
-    pattern = expand.T @ _scatter(mesh, np.ones((len(mesh.triangles), 6, 6))) @ expand
-    in_joint = (abs(_joint_operator(points, n)) @ expand).sum(axis=0) > 0
+    size = 2 * mesh.triangles.shape[1]
+    pattern = expand.T @ scatter(n, mesh.triangles, np.ones((len(mesh.triangles), size, size))) @ expand
+    in_joint = (abs(joint_operator(points, n)) @ expand).sum(axis=0) > 0
     order = np.concatenate([_fill_reducing(sp.csc_array(pattern), np.flatnonzero(~in_joint)), np.flatnonzero(in_joint)])
     return sp.csr_array(expand[:, order]), int((~in_joint).sum())
 

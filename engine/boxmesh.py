@@ -5,13 +5,16 @@ only the outermost column or row may be cut (D12). Diagonals are mirrored about 
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import ceil, exp, log
 
 import numpy as np
 
-from .mesh import Flags, Floats, Ints, Mesh
+from .bisection import refined
+from .mesh import SIDES, Flags, Floats, Ints, Mesh
 from .spec import Box, Layer, MeshOptions, Spec
+from .walls import with_sections
 
 SLIVER = 0.25
 """An outermost column or row thinner than this part of the regular size is joined to its neighbour."""
@@ -83,31 +86,29 @@ class BoxMesh:
 def box_mesh(spec: Spec) -> BoxMesh:
     """Mesh of the model in metres. Materials: one a layer, the structure last."""
     grid = _grid(spec)
-    cells = _cells(grid, spec)
-    ground, structure = (_split(grid, cells, cells.kind == kind, kind * grid.n_node) for kind in (0, 1))
-    triangles = np.concatenate([ground, structure])
-    outline = _outline(grid)
-    material = np.repeat(np.concatenate([cells.layer[cells.kind == 0], cells.layer[cells.kind == 1]]), 2)
-    used, renumbered = np.unique(triangles, return_inverse=True)
-    new = np.full(2 * grid.n_node, -1)
+    nodes, triangles, material = _solid(grid, spec)
+    solid = material == len(spec.layer)
+    outline, outside = _outline(grid, nodes, triangles, material, solid)
+    n = len(nodes)
+    numbered = triangles + n * solid[:, None]  # the structure's nodes after the ground's: on the outline there are two of each
+    used, renumbered = np.unique(numbered, return_inverse=True)
+    new = np.full(2 * n, -1)
     new[used] = np.arange(len(used))
-    touching = (new[outline] >= 0).all(axis=1) & (cells.outside >= 0)
-    joints = np.column_stack([outline, outline[:, ::-1] + grid.n_node])[touching]
-    nodes = np.column_stack([np.tile(grid.x, len(grid.y)), np.repeat(grid.y, len(grid.x))])
-    joint_nodes = new[joints]
-    groups, joint_material = _joint_groups(nodes[joints[:, 0]], nodes[joints[:, 1]], cells.outside[touching], spec)
+    joints = np.column_stack([outline, outline[:, ::-1] + n])[outside >= 0]
+    groups, joint_material = _joint_groups(nodes[joints[:, 0]], nodes[joints[:, 1]], outside[outside >= 0], spec)
     mesh = Mesh(
-        nodes=nodes[used % grid.n_node],
+        nodes=nodes[used % n],
         triangles=renumbered.reshape(-1, 3),
         material=material,
-        joints=joint_nodes,
+        joints=new[joints],
         joint_material=joint_material,
-        pressure_edges=new[outline + grid.n_node],
-        boundaries={name: new[ids][new[ids] >= 0] for name, ids in _boundaries(grid).items()},
-        corners=new[grid.corners() + grid.n_node],
-        structure=material == len(spec.layer),
+        pressure_edges=new[outline + n],
+        boundaries={name: new[ids][new[ids] >= 0] for name, ids in _boundaries(grid, nodes).items()},
+        corners=new[grid.corners() + n],
+        structure=solid,
     )
-    return BoxMesh(_with_named_points(mesh, spec), groups)
+    mesh = with_sections(mesh, spec.box, spec.output.sections)
+    return BoxMesh(_with_named_points(mesh.quadratic() if spec.mesh.order == 2 else mesh, spec), groups)
 
 
 @dataclass(frozen=True)
@@ -133,16 +134,11 @@ class _Grid:
 
 @dataclass(frozen=True)
 class _Cells:
-    """Cells of the grid, row by row: lower left node, layer (the structure comes last), kind 0 ground, 1 structure, 2 void.
-
-    outside : layer on the other side of each edge of the outline, -1 where there is no ground
-    """
+    """Cells of the grid, row by row: lower left node, layer (the structure comes last, then the void), side of the box's axis."""
 
     origin: Ints
     layer: Ints
-    kind: Ints
     right_of_axis: Flags
-    outside: Ints
 
 
 def _grid(spec: Spec) -> _Grid:
@@ -223,14 +219,46 @@ def _cells(grid: _Grid, spec: Spec) -> _Cells:
     height = depth[row] - spec.box.depth
     hollow = (np.abs(middle) < spec.box.width / 2 - spec.box.wall) & (height > spec.box.wall)
     hollow &= height < spec.box.height - spec.box.wall
-    kind = np.where(in_box, np.where(hollow, 2, 1), 0)
-    outside_rows = np.concatenate(
-        [np.full(right - left, low - 1), np.arange(low, high), np.full(right - left, high), np.arange(low, high)[::-1]]
-    )
-    covered = outside_rows < rows
-    outside = np.where(covered, layer_of_row[np.minimum(outside_rows, rows - 1)], -1)
-    layer = np.where(kind == 0, layer_of_row[row], len(spec.layer))
-    return _Cells(grid.node(column, row), layer, kind, middle > 0, outside)
+    inside = np.where(hollow, len(spec.layer) + 1, len(spec.layer))
+    return _Cells(grid.node(column, row), np.where(in_box, inside, layer_of_row[row]), middle > 0)
+
+
+def _solid(grid: _Grid, spec: Spec) -> tuple[Floats, Ints, Ints]:
+    """Nodes, triangles and materials of ground and structure in one, refined at the corners of the box; ground comes first."""
+    cells = _cells(grid, spec)
+    nodes = np.column_stack([np.tile(grid.x, len(grid.y)), np.repeat(grid.y, len(grid.x))])
+    triangles, material = _split(grid, cells), np.repeat(cells.layer, 2)
+    structure = len(spec.layer)
+    there = np.concatenate([np.flatnonzero(material < structure), np.flatnonzero(material == structure)])
+    triangles, material = triangles[there], material[there]
+    if spec.mesh.corner_levels:
+        rule = partial(_too_large, _corners(spec.box), spec.mesh, spec.box.wall, material == structure)
+        nodes, triangles, origin = refined(nodes, triangles, rule)
+        material = material[origin]
+    return nodes, triangles, material
+
+
+def _corners(box: Box) -> tuple[Floats, Floats]:
+    """Places (4, 2) of the outer and of the inner corners of the box."""
+    middle = np.array([box.offset, -box.depth - box.height / 2])
+    outer = np.array([box.width, box.height]) / 2
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+    return middle + signs * outer, middle + signs * (outer - box.wall)
+
+
+def _too_large(
+    corners: tuple[Floats, Floats], options: MeshOptions, wall: float, solid: Flags, at: Floats, origin: Ints
+) -> Flags:
+    """Which triangles (n, 3, 2) are larger than the grading at the box's corners allows.
+
+    Stresses are singular at the inner corners: sizes grow away from them through the structure. At the outer corners the joint
+    opens and closes within a few of its thicknesses: the elements that meet there may be half as large again.
+    """
+    smallest = 1.01 * wall / options.wall_elements / 2**options.corner_levels
+    size = np.linalg.norm(np.roll(at, -1, axis=1) - at, axis=2).max(axis=1) / np.sqrt(2)  # of half a square: its side
+    to_outer, to_inner = (np.linalg.norm(at[:, :, None] - ends, axis=3).min(axis=(1, 2)) for ends in corners)
+    in_structure = size > smallest + (options.corner_growth - 1) * to_inner
+    return (solid[origin] & in_structure) | ((to_outer < 1e-9 * wall) & (size > 1.5 * smallest))
 
 
 def layer_at(depth: Floats, layers: tuple[Layer, ...]) -> Ints:
@@ -239,38 +267,49 @@ def layer_at(depth: Floats, layers: tuple[Layer, ...]) -> Ints:
     return np.searchsorted(bottoms, depth)
 
 
-def _split(grid: _Grid, cells: _Cells, chosen: Flags, shift: int) -> Ints:
-    """Two triangles for each chosen cell, diagonals mirrored about the box's axis; node numbers moved by `shift`."""
-    sw = cells.origin[chosen] + shift
+def _split(grid: _Grid, cells: _Cells) -> Ints:
+    """Two triangles for each cell, diagonals mirrored about the box's axis; a triangle starts with its diagonal."""
+    sw = cells.origin
     se, nw = sw + 1, sw + len(grid.x)
     ne = nw + 1
-    right = cells.right_of_axis[chosen][:, None, None]
-    rising = np.stack([np.column_stack([sw, se, ne]), np.column_stack([sw, ne, nw])], axis=1)
-    falling = np.stack([np.column_stack([sw, se, nw]), np.column_stack([se, ne, nw])], axis=1)
+    right = cells.right_of_axis[:, None, None]
+    rising = np.stack([np.column_stack([ne, sw, se]), np.column_stack([sw, ne, nw])], axis=1)
+    falling = np.stack([np.column_stack([se, nw, sw]), np.column_stack([nw, se, ne])], axis=1)
     return np.where(right, falling, rising).reshape(-1, 3)
 
 
-def _outline(grid: _Grid) -> Ints:
-    """Edges of the box's outer face, counter-clockwise from the lower left corner: the box lies to their left."""
+def _outline(grid: _Grid, nodes: Floats, triangles: Ints, material: Ints, solid: Flags) -> tuple[Ints, Ints]:
+    """Edges of the box's outer face, counter-clockwise from the lower left corner with the box to their left, and the layer on
+    the other side of each, -1 where there is no ground."""
+    sides = triangles[:, SIDES]
     (left, right), (low, high) = grid.columns, grid.rows
-    across, upwards = np.arange(left, right + 1), np.arange(low, high + 1)
-    sides = [
-        grid.node(across, low),
-        grid.node(right, upwards),
-        grid.node(across[::-1], high),
-        grid.node(left, upwards[::-1]),
-    ]
-    return np.concatenate([np.column_stack([side[:-1], side[1:]]) for side in sides])
-
-
-def _boundaries(grid: _Grid) -> dict[str, Ints]:
-    columns, rows = np.arange(len(grid.x)), np.arange(len(grid.y))
-    return {
-        "base": grid.node(columns, 0),
-        "left": grid.node(0, rows),
-        "right": grid.node(len(grid.x) - 1, rows),
-        "surface": grid.node(columns, len(grid.y) - 1),
+    corner = np.array([[grid.x[left], grid.y[low]], [grid.x[right], grid.y[high]]])
+    ends = nodes[sides[solid].reshape(-1, 2)]
+    on_face = (ends[:, :, None, :] == corner).all(axis=1).any(axis=(1, 2))
+    edges = sides[solid].reshape(-1, 2)[on_face]
+    edges = edges[np.argsort(_arc(nodes[edges].mean(axis=1), corner))]
+    beside = {
+        (int(b), int(a)): int(m) for (a, b), m in zip(sides[~solid].reshape(-1, 2), np.repeat(material[~solid], 3), strict=True)
     }
+    return edges, np.array([beside.get((int(a), int(b)), -1) for a, b in edges])
+
+
+def _arc(places: Floats, corner: Floats) -> Floats:
+    """Arc length of places on a rectangle's outline, counter-clockwise from its lower left corner; corner (2, 2): low, high."""
+    (x0, y0), (x1, y1) = corner
+    x, y = places.T
+    width, height = x1 - x0, y1 - y0
+    on = [y == y0, x == x1, y == y1, x == x0]
+    return np.select(on, [x - x0, width + y - y0, width + height + x1 - x, 2 * width + height + y1 - y])
+
+
+def _boundaries(grid: _Grid, nodes: Floats) -> dict[str, Ints]:
+    """Nodes on the sides of the domain, from left to right or from the base up."""
+    x, y = nodes.T
+    upright = {"left": x == grid.x[0], "right": x == grid.x[-1]}
+    across = {"base": y == grid.y[0], "surface": y == grid.y[-1]}
+    found = {name: np.flatnonzero(on)[np.argsort(y[on])] for name, on in upright.items()}
+    return found | {name: np.flatnonzero(on)[np.argsort(x[on])] for name, on in across.items()}
 
 
 def _joint_groups(first: Floats, second: Floats, layer: Ints, spec: Spec) -> tuple[tuple[tuple[int, float], ...], Ints]:
@@ -308,15 +347,16 @@ def _nearest(mesh: Mesh, place: tuple[float, float], among: Flags) -> int:
     return int(candidates[np.argmin(((mesh.nodes[candidates] - place) ** 2).sum(axis=1))])
 
 
-def column_mesh(y: Floats, layers: tuple[Layer, ...]) -> Mesh:
+def column_mesh(y: Floats, layers: tuple[Layer, ...], order: int = 1) -> Mesh:
     """One column of the layered ground on the lines y (from the base up), 1 m wide: the free field when its sides are tied."""
     rows = np.arange(len(y))
     nodes = np.column_stack([np.tile([0.0, 1.0], len(y)), np.repeat(y, 2)])
     sw = 2 * rows[:-1]
     triangles = np.stack([np.column_stack([sw, sw + 1, sw + 3]), np.column_stack([sw, sw + 3, sw + 2])], axis=1)
-    return Mesh(
+    mesh = Mesh(
         nodes=nodes,
         triangles=triangles.reshape(-1, 3),
         material=np.repeat(layer_at(-(y[:-1] + y[1:]) / 2, layers), 2),
         boundaries={"base": np.array([0, 1]), "left": 2 * rows, "right": 2 * rows + 1},
     )
+    return mesh.quadratic() if order == 2 else mesh

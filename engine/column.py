@@ -29,7 +29,9 @@ class FreeField:
 
 def column_system(model: Model, probes: dict[str, float]) -> System:
     """The column on the lines of a model's side, with named probes at the given heights y [m]."""
-    mesh = column_mesh(model.system.mesh.nodes[model.system.mesh.boundaries["left"], 1], model.spec.layer)
+    side, order = model.system.mesh.boundaries["left"], model.spec.mesh.order
+    lines = np.sort(model.system.mesh.nodes[side, 1])[::order]  # without the nodes between
+    mesh = column_mesh(lines, model.spec.layer, order)
     for name, y in probes.items():
         mesh = mesh.with_probe(name, 0.0, y)
     lumped = model.spec.mesh.mass == "lumped"

@@ -9,7 +9,8 @@ from scipy.sparse.linalg import splu
 from .assembly import System, rows
 from .kernels.jit import LANES
 from .kernels.march import Contact, solve_joints
-from .kernels.sparse import Factor, Rows, backward, forward, product, subtract_transposed_product
+from .kernels.panels import Factor, backward, factor_of, forward
+from .kernels.sparse import Rows, product, subtract_transposed_product
 from .kernels.states import Law, Workspace, workspace
 from .mesh import Flags, Floats, MeshError
 
@@ -28,10 +29,9 @@ def factorise(matrix: sp.sparray, n_interior: int) -> Factor:
     if not ((pivots > 0).all() and (lu.perm_r == natural).all() and (lu.perm_c == natural).all()):
         raise MeshError("the matrix is not positive definite: is there a node without mass, or a part that nothing holds?")
     lower = sp.csc_array(sp.tril(lu.L, k=-1))
-    lower.eliminate_zeros()
-    return Factor(
-        lower.indptr.astype(np.int64), lower.indices.astype(np.int64), lower.data.copy(), pivots.copy(), int(n_interior)
-    )
+    lower.sort_indices()
+    indptr, indices = lower.indptr.astype(np.int64), lower.indices.astype(np.int64)
+    return factor_of(indptr, indices, lower.data.copy(), pivots.copy(), int(n_interior))
 
 
 def solve(factor: Factor, x: Floats) -> Floats:

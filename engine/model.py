@@ -2,14 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from .assembly import Constraints, JointMaterial, Material, System, build_system
 from .boxmesh import box_mesh
+from .flexibility import flexibility_ratio
 from .mesh import Floats
 from .modes import natural_frequencies, rayleigh_coefficients
 from .newmark import Newmark, Rayleigh, Stepper
+from .sections import SectionForces
 from .simulate import Response, Trace, simulate
 from .spec import Domain, Spec
 from .state import Lanes
@@ -40,8 +43,26 @@ class Model:
 
     def pressure(self, spec: Spec) -> Floats:
         """Water pressure load (n_dof,): p = p0 depth / reference_height on the box's outer face, inward."""
-        depth = -self.system.mesh.nodes[:, 1]
-        return self.system.pressure_load(depth / spec.pressure.reference_height) * spec.pressure.p0
+        return self.system.pressure_load(self._depth_ratio(spec)) * spec.pressure.p0
+
+    def behind_sections(self, spec: Spec) -> Floats:
+        """Part (3 n_section,) of weight and pressure behind each section."""
+        gravity = spec.gravity.acceleration if spec.gravity.self_weight else 0.0
+        return self.sections.loads(gravity, self._depth_ratio(spec) * spec.pressure.p0)
+
+    def _depth_ratio(self, spec: Spec) -> Floats:
+        """Depth of every node over the height at which the pressure is p0, (n_node,)."""
+        return -self.system.mesh.nodes[:, 1] / spec.pressure.reference_height
+
+    @cached_property
+    def flexibility_ratio(self) -> float:
+        """F of the box in its layers."""
+        return flexibility_ratio(self.system.mesh, self.spec)
+
+    @cached_property
+    def sections(self) -> SectionForces:
+        """Section forces of the mesh."""
+        return SectionForces.of(self.system)
 
 
 def joint_materials(spec: Spec, groups: Sequence[tuple[int, float]]) -> tuple[JointMaterial, ...]:
@@ -108,7 +129,8 @@ def simulate_cases(
     """March cases that share `model` side by side; motions (n_step + 1, 2) [m/s²] of each. The rest is as in `simulate`."""
     loads = [(model.weight(spec), model.pressure(spec)) for spec in specs]
     laws = [model.system.joint_law(model.joint_materials(spec)) for spec in specs]
-    lanes = Lanes.of([weight + pressure for weight, pressure in loads], laws, list(motions))
+    behind = [model.behind_sections(spec) for spec in specs]
+    lanes = Lanes.of([weight + pressure for weight, pressure in loads], laws, list(motions), behind)
     static = [np.zeros_like(lanes.standing), np.zeros_like(lanes.standing)]
     for lane, pair in enumerate(loads):
         static[0][:, lane], static[1][:, lane] = pair

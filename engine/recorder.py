@@ -6,13 +6,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from .assembly import System
+from .mesh import Probe
 
-STRESSES = ("xx", "yy", "xy")
+STRESSES = ("xx", "yy", "xy", "zz")
 
 
 @dataclass(frozen=True)
 class Recorder:
-    """Values linear in u: displacement (x, y) and stress (xx, yy, xy) of every probe, racking, racking_shear.
+    """Values linear in u: displacement (x, y) and stress (xx, yy, xy, zz) of every probe, racking, racking_shear.
 
     operator : (n_value, n_dof); the order is displacement (point, component), stress (point, component), then the two rackings
     """
@@ -40,12 +41,12 @@ class Recorder:
         return values[..., : 2 * n].reshape(*values.shape[:-1], n, 2)
 
     def stress(self, values: np.ndarray) -> np.ndarray:
-        """The part (…, point, 3) of recorded values (…, n_value)."""
+        """The part (…, point, 4) of recorded values (…, n_value)."""
         n = len(self.points)
-        return values[..., 2 * n : 5 * n].reshape(*values.shape[:-1], n, 3)
+        return values[..., 2 * n : 6 * n].reshape(*values.shape[:-1], n, 4)
 
 
-def _displacement(system: System, probe) -> sp.csr_array:
+def _displacement(system: System, probe: Probe) -> sp.csr_array:
     weights = np.zeros((2, 2 * len(system.mesh.nodes)))
     for node, weight in zip(probe.nodes, probe.node_weights, strict=True):
         weights[0, 2 * node] += weight
@@ -53,11 +54,10 @@ def _displacement(system: System, probe) -> sp.csr_array:
     return sp.csr_array(weights) @ system.expand
 
 
-def _stress(system: System, probe) -> sp.csr_array:
-    weights = np.zeros((3, system.stress.shape[0]))
-    for triangle, weight in zip(probe.triangles, probe.triangle_weights, strict=True):
-        weights[np.arange(3), 3 * triangle + np.arange(3)] = weight
-    return sp.csr_array(weights) @ system.stress
+def _stress(system: System, probe: Probe) -> sp.csr_array:
+    """(4, n_dof): weighted mean of the stresses in the probe's triangles."""
+    mean = sp.csr_array(np.kron(probe.triangle_weights, np.eye(4)))
+    return mean @ system.stress_rows(probe.triangles, probe.places)
 
 
 def racking_operator(system: System) -> sp.csr_array:

@@ -6,16 +6,15 @@ from enum import IntEnum
 
 import numpy as np
 
-from .assembly import System, rows
+from .assembly import System
 from .kernels.jit import LANES
-from .kernels.joint import OPEN
-from .kernels.march import JOINT_ELASTIC, STRAIN, audit, joint_fractions, observe, observe_joints
-from .kernels.sparse import Rows, product
+from .kernels.march import JOINT_ELASTIC, STRAIN, audit
 from .mesh import Flags, Floats
 from .newmark import Stepper, StepReport
 from .recorder import Recorder
 from .state import Lanes, State
 from .static import equilibrium
+from .watch import JointWatch, SectionWatch, ValueWatch
 
 RESOLVED = 1e-3
 """The account is read against at least this part of what the static stage stored: 1e-9 of it is the rounding of that store."""
@@ -59,7 +58,13 @@ class Response:
     time : (n_time,) [s]; values : (n_lane, n_time, n_value) in the recorder's order
     fractions : (n_lane, n_time, 2) of the joint length that is open, that slips
     states : (n_lane, n_time, n_point) joint states as kernels.joint numbers them, -1 in a failed lane
+    pressure, slip : (n_lane, n_time, n_point) contact pressure [Pa] and slip [m] of the joint, in single precision
+    friction_work : (n_lane, n_time) [J/m] of the whole joint since the static state; joint_work : (n_lane, n_point) at the end
     peaks : (n_lane, 2, n_value) largest magnitudes, total and minus static
+    principal_extremes : (n_lane, 2, n_probe) largest and smallest principal stress, the one out of the plane among them
+    section_forces : (n_lane, n_time, n_section, 3) N, Q [N/m], M [Nm/m], in single precision
+    section_extremes : (n_lane, n_section, 6, 3) N, Q, M at the moments of the largest and smallest N, Q, M
+    section_times : (n_lane, n_section, 6) [s] of these moments
     joint_peaks : (n_lane, 4, n_point) opening [m], slip [m], pressure [Pa], penetration [m]
     first_slip : (n_lane, n_point) [s] when a closed point first slid beyond its elastic range before the shaking, NaN where never
     static_open : (n_lane, n_point) 1 where the joint carries no pressure before shaking; static_gap : (n_lane, n_point) [m]
@@ -74,7 +79,15 @@ class Response:
     values: Floats
     fractions: Floats
     states: np.ndarray
+    pressure: np.ndarray
+    slip: np.ndarray
+    friction_work: Floats
+    joint_work: Floats
     peaks: Floats
+    principal_extremes: Floats
+    section_forces: np.ndarray
+    section_extremes: Floats
+    section_times: Floats
     joint_peaks: Floats
     first_slip: Floats
     static_open: Floats
@@ -129,27 +142,17 @@ def simulate(
 
 
 class _Run:
-    """The arrays that a march fills."""
+    """A march and its account."""
 
     def __init__(self, stepper: Stepper, lanes: Lanes, every: int) -> None:
         self.stepper, self.every = stepper, every
         self.lanes = replace(lanes, standing=lanes.standing.copy(), ground=lanes.ground.copy())
         self.system: System = stepper.system
-        self.recorder = Recorder.of(self.system)
-        self._operator: Rows = rows(self.recorder.operator)
-        n_value, n_point = self.recorder.operator.shape[0], len(self.system.points)
-        n_kept = (len(lanes.ground) - 1) // every + 1
+        self.n_kept = (len(lanes.ground) - 1) // every + 1
         self.state = State.at_rest(self.system)
-        self.values: Floats = np.zeros((n_value, LANES))
-        self.kept: Floats = np.full((n_kept, n_value, LANES), np.nan)
-        self.fractions: Floats = np.full((n_kept, 2, LANES), np.nan)
-        self.states = np.full((n_kept, LANES, n_point), -1, dtype=np.int8)
-        self.peaks: Floats = np.zeros((2, n_value, LANES))
-        self.joint_peaks: Floats = np.zeros((4, LANES, n_point))
-        self.first_slip: Floats = np.full((LANES, n_point), np.nan)
-        self.shape: Floats = np.zeros((self.system.n_dof, LANES))
-        self.shape_time: Floats = np.zeros(LANES)
-        self.shape_state: Floats = np.zeros((LANES, n_point))
+        self.values = ValueWatch(self.system, self.n_kept)
+        self.joints = JointWatch(self.system, lanes, self.n_kept)
+        self.sections = SectionWatch(self.system, stepper.rayleigh, lanes, self.n_kept)
         self.iterations: Floats = np.zeros(LANES)
         self.residual: Floats = np.zeros(LANES)
         self.source_test: Floats = np.zeros(LANES)
@@ -174,13 +177,9 @@ class _Run:
         stiffness = np.stack([self.lanes.law.k_n, self.lanes.law.k_s], axis=2)
         self.start_energy = np.stack([0.5 * (motion.u * motion.Ku).sum(axis=0), 0.5 * (force**2 / stiffness).sum(axis=(1, 2))])
         self.state.energy[STRAIN], self.state.energy[JOINT_ELASTIC] = self.start_energy
-        product(self._operator, motion.u, self.values)
-        self.static_values = self.values.copy()
-        self.static_open = (contact.state == OPEN).astype(float)
-        self.static_gap = contact.gap[:, ::2].copy()
-        self.slip_before = contact.slip.copy()
-        self.elastic_range = self.lanes.law.mu * np.abs(force[:, :, 0]) / self.lanes.law.k_s
-        self._observe(0)
+        self.values.begin(self.state)
+        self.joints.begin(self.state)
+        self._see(0)
 
     def traced(self, step: int, report: StepReport | None = None) -> Trace:
         """What the first lane did in a step; without a report, what it is before the first one."""
@@ -193,8 +192,7 @@ class _Run:
         report = self.stepper.step(self.state, self.lanes, ground[step - 1], ground[step])
         self._judge(step, report)
         audit(self.state.energy, self.start_energy, self.account)
-        product(self._operator, self.state.motion.u, self.values)
-        self._observe(step)
+        self._see(step)
         return report
 
     def _judge(self, step: int, report: StepReport) -> None:
@@ -222,59 +220,39 @@ class _Run:
         self.lanes.standing[:, lane] = 0.0
         self.lanes.ground[:, :, lane] = 0.0
 
-    def _observe(self, step: int) -> None:
+    def _see(self, step: int) -> None:
         time = step * self.stepper.newmark.dt
-        record_holder = np.zeros(LANES, dtype=bool)
-        observe(self.values, self.static_values, self.peaks, self.recorder.racking, record_holder)
-        n, area = self.lanes.n_lane, self.system.points.area
-        if len(area):
-            observe_joints(
-                self.state.contact, area, n, time, self.slip_before, self.elastic_range, self.joint_peaks, self.first_slip
-            )
-        for lane in np.flatnonzero(record_holder):
-            self.shape[:, lane] = self.state.motion.u[:, lane]
-            self.shape_state[lane] = self.state.contact.state[lane]
-            self.shape_time[lane] = time
+        self.values.see(time, self.state)
+        self.joints.see(time, self.state)
+        self.sections.see(time, self.state, self.lanes.ground[step])
         if step % self.every == 0:
             row = step // self.every
-            self.kept[row] = self.values
-            self.states[row] = self.state.contact.state
-            joint_fractions(self.state.contact.state, self.system.points.length, n, self.fractions[row])
+            self.values.keep(row)
+            self.joints.keep(row, self.state)
+            self.sections.keep(row)
 
     def response(self) -> Response:
-        """Everything kept, lane first, with failed lanes emptied."""
+        """Everything seen and kept, lane first, with failed lanes emptied."""
         n = self.lanes.n_lane
         scale = np.maximum(self.account[2], RESOLVED * self.start_energy.sum(axis=0))
         scale[scale == 0.0] = 1.0
-        failed = self.status[:n] >= Status.NOT_CONVERGED
-        self.states[:, :n][:, failed] = -1
-        expand = self.system.expand
-
-        def of_lanes(array: Floats, axis: int) -> Floats:
-            chosen = np.moveaxis(array, axis, 0)[:n].copy()
-            chosen[failed] = np.nan
-            return chosen
-
+        own = {
+            "iterations": self.iterations,
+            "residual": self.residual,
+            "source_test": self.source_test,
+            "energy_error": self.account[0] / scale,
+            "contact_drift": self.account[1] / scale,
+        }
+        found = {
+            name: array[:n].copy()
+            for name, array in (self.values.found() | self.joints.found() | self.sections.found() | own).items()
+        }
+        for array in found.values():
+            array[self.status[:n] >= Status.NOT_CONVERGED] = -1 if array.dtype.kind == "i" else np.nan
         return Response(
-            recorder=self.recorder,
-            time=self.stepper.newmark.dt * self.every * np.arange(len(self.kept), dtype=float),
-            values=of_lanes(self.kept, 2),
-            fractions=of_lanes(self.fractions, 2),
-            states=np.moveaxis(self.states[:, :n], 1, 0),
-            peaks=of_lanes(self.peaks, 2),
-            joint_peaks=of_lanes(self.joint_peaks, 1),
-            first_slip=of_lanes(self.first_slip, 0),
-            static_open=of_lanes(self.static_open, 0),
-            static_gap=of_lanes(self.static_gap, 0),
-            static_values=of_lanes(self.static_values, 1),
-            shape=of_lanes((expand @ self.shape).reshape(-1, 2, LANES), 2),
-            shape_time=of_lanes(self.shape_time, 0),
-            shape_state=of_lanes(self.shape_state, 0),
+            recorder=self.values.recorder,
+            time=self.stepper.newmark.dt * self.every * np.arange(self.n_kept, dtype=float),
             status=self.status[:n].copy(),
             reason=tuple(self.reason[:n]),
-            iterations=of_lanes(self.iterations, 0),
-            residual=of_lanes(self.residual, 0),
-            source_test=of_lanes(self.source_test, 0),
-            energy_error=of_lanes(self.account[0] / scale, 0),
-            contact_drift=of_lanes(self.account[1] / scale, 0),
+            **found,
         )

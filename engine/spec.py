@@ -185,20 +185,32 @@ class Time(Section):
 
 
 class MeshOptions(Section):
-    """How fine the mesh is."""
+    """How fine the mesh is. The defaults are the recommended mesh: see docs/mesh.md."""
 
-    wall_elements: Annotated[int, Field(strict=True, ge=1, le=20, description="elements through a wall")] = 2
+    order: Annotated[
+        int,
+        Field(
+            strict=True, ge=1, le=2, description="1: triangles of three nodes; 2: of six, with joints of six, which bend right"
+        ),
+    ] = 2
+    wall_elements: Annotated[int, Field(strict=True, ge=1, le=20, description="elements through a wall")] = 1
     roof_elements: Annotated[
         int, Field(strict=True, ge=2, le=200, multiple_of=2, description="elements along the clear width")
-    ] = 8
+    ] = 4
     side_elements: Annotated[
         int, Field(strict=True, ge=2, le=200, multiple_of=2, description="elements along the clear height")
-    ] = 6
-    first: Quantity("m", "size of the ground elements at the box", gt=0) = 0.5
-    growth: Quantity("1", "growth of their size, an element to the next, away from it", ge=1, le=4) = 1.2
-    largest_width: Quantity("m", "largest width of a ground element", gt=0) = 1.0
-    largest_height: Quantity("m", "largest height of a ground element", gt=0) = 0.5
-    mass: Annotated[Literal["consistent", "lumped"], Field(description="mass matrix")] = "consistent"
+    ] = 4
+    corner_levels: Annotated[
+        int, Field(strict=True, ge=0, le=8, description="how often the elements at the box's corners are halved in size")
+    ] = 4
+    corner_growth: Quantity("1", "growth of the structure's elements, one to the next, away from its corners", ge=1.1, le=4) = (
+        1.65
+    )
+    first: Quantity("m", "size of the ground elements at the box", gt=0) = 1.0
+    growth: Quantity("1", "growth of their size, an element to the next, away from it", ge=1, le=4) = 2.0
+    largest_width: Quantity("m", "largest width of a ground element", gt=0) = 3.0
+    largest_height: Quantity("m", "largest height of a ground element", gt=0) = 2.0
+    mass: Annotated[Literal["consistent", "lumped"], Field(description="mass matrix; lumped with order 1 alone")] = "consistent"
 
 
 class Joint(Section):
@@ -207,7 +219,8 @@ class Joint(Section):
     thickness: Quantity("m", "joint thickness t_j", gt=0) = 0.05
     thickness_ratio: Quantity("1", "t_j over the element's length; replaces thickness", gt=0) | None = None
     quadrature: Annotated[
-        Literal["nodal", "one-point"], Field(description="joint points: at the nodes, or one in the middle as in the source")
+        Literal["nodal", "one-point"],
+        Field(description="joint points: at the nodes, or (with mesh.order 1) one in the middle as in the source"),
     ] = "nodal"
 
 
@@ -236,6 +249,12 @@ class Output(Section):
     every: Annotated[
         int, Field(strict=True, ge=1, le=100_000, description="histories keep every so many steps; peaks see all")
     ] = 2
+    sections: Annotated[
+        int,
+        Field(
+            strict=True, ge=3, le=99, description="sections along each of roof, floor and walls where N, Q and M are read; odd"
+        ),
+    ] = 5
     points: Annotated[
         dict[str, tuple[Quantity("m", "x"), Quantity("m", "y")]],
         Field(description="further points: name = [x, y], x from the middle of the domain, y up from the surface"),
@@ -318,6 +337,12 @@ def _conflicts(spec: Spec) -> Any:
         yield 'supports.sides = "shear": would carry the self-weight; choose tied, or gravity.self_weight = false'
     if spec.supports.sides == "shear" and spec.motion.vertical_record != "none":
         yield 'supports.sides = "shear": is for horizontal motion only; choose tied or roller'
+    if mesh.order == 2 and mesh.mass == "lumped":
+        yield 'mesh.mass = "lumped": six-node triangles (mesh.order = 2) have no sound lumped mass; choose consistent'
+    if mesh.order == 2 and spec.joint.quadrature == "one-point":
+        yield 'joint.quadrature = "one-point": cannot hold a joint of six nodes (mesh.order = 2); choose nodal'
+    if spec.output.sections % 2 == 0:
+        yield f"output.sections = {spec.output.sections}: must be odd, to have ends and a middle"
     for name, (x, y) in spec.output.points.items():
         if name in NAMED_POINTS:
             yield f"output.points.{name}: is a name the model has already ({', '.join(NAMED_POINTS)})"

@@ -1,6 +1,7 @@
 """State of a batch of lanes, and what drives it. Arrays of degrees of freedom are (n_dof, LANES), of joints (LANES, …)."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,8 +25,10 @@ class State:
         """All zero: no displacement, joints just touching."""
         m = 2 * len(system.points)
         motion = Motion(*(np.zeros((system.n_dof, LANES)) for _ in Motion._fields))
-        floats = (np.zeros((LANES, m)), np.zeros((LANES, m)), np.zeros((LANES, m)), np.zeros((LANES, m // 2)))
-        return cls(motion, Contact(*floats, np.zeros((LANES, m // 2), dtype=np.int8)), np.zeros((8, LANES)))
+        gap, force, damped = (np.zeros((LANES, m)) for _ in range(3))
+        slip, work = (np.zeros((LANES, m // 2)) for _ in range(2))
+        state = np.zeros((LANES, m // 2), dtype=np.int8)
+        return cls(motion, Contact(gap, force, damped, slip, work, state), np.zeros((8, LANES)))
 
     def alone(self, lane: int) -> "State":
         """A copy with this lane first and nothing in the others."""
@@ -53,18 +56,26 @@ class Lanes:
     law : joint parameters, each (LANES, n_point)
     ground : (n_step + 1, 2, LANES) base acceleration in x and y at every step
     n_lane : lanes in use; the rest is padding
+    behind_sections : (3 n_section, LANES) part of the standing loads behind each section, from `SectionForces.loads`
     """
 
     standing: Floats
     law: Law
     ground: Floats
     n_lane: int
+    behind_sections: Floats = field(default_factory=lambda: np.zeros((0, LANES)))
 
     @classmethod
-    def of(cls, standing: list[Floats], laws: list[tuple[Floats, Floats, Floats]], ground: list[Floats]) -> "Lanes":
+    def of(
+        cls,
+        standing: list[Floats],
+        laws: list[tuple[Floats, Floats, Floats]],
+        ground: list[Floats],
+        behind_sections: Sequence[Floats] = (),
+    ) -> "Lanes":
         """Put cases side by side: standing loads (n_dof,), joint laws from `System.joint_law`, ground motions (n_step + 1, 2).
 
-        Motions of unequal length are padded with zeros to the longest.
+        Motions of unequal length are padded with zeros to the longest. behind_sections : (3 n_section,) each, none by default.
         """
         if not 1 <= len(standing) <= LANES:
             raise ValueError(f"a batch holds 1 to {LANES} cases, not {len(standing)}")
@@ -77,7 +88,10 @@ class Lanes:
             motions[: len(motion), :, lane] = motion
             for array, value in zip(law, values, strict=True):
                 array[lane] = value
-        return cls(loads, law, motions, len(standing))
+        behind = np.zeros((len(behind_sections[0]) if behind_sections else 0, LANES))
+        for lane, part in enumerate(behind_sections):
+            behind[:, lane] = part
+        return cls(loads, law, motions, len(standing), behind)
 
     def alone(self, lane: int) -> "Lanes":
         """One lane by itself, without its motion."""

@@ -34,6 +34,7 @@ def equilibrium(system: System, lanes: Lanes, loads: list[Floats], first_frequen
             found &= solver.settle(state, replace(lanes, standing=applied + load * (k / LOAD_STEPS)), found & loaded)
         applied = applied + load
     state.energy[:] = 0.0
+    state.contact.work[:] = 0.0
     return state, found
 
 

@@ -9,7 +9,7 @@ from .model import build_model, simulate_cases
 from .spec import Joint, MeshOptions, Spec
 
 COARSE = Spec(
-    mesh=MeshOptions(wall_elements=1, roof_elements=2, side_elements=2, first=4, growth=2, largest_width=20, largest_height=10),
+    mesh=MeshOptions(roof_elements=2, side_elements=2, corner_levels=0, first=4, largest_width=20, largest_height=10),
     joint=Joint(thickness_ratio=0.1),
 )
 N_STEP = 2

@@ -18,11 +18,11 @@ from rich.text import Text
 from engine import PRESETS
 
 from .advice import advise
-from .dataset import study_hash
 from .domain_size import convergence_sentences, is_domain_size, source_sentence
 from .fields import catalogue
 from .messages import StudyError
 from .plan import Study, load_study, shipped_studies
+from .provenance import study_hash
 from .run import run_study, trace_case, write_dataset
 from .show import TRACE_HEAD, show_lines, trace_line
 from .sizes import MEASURES

@@ -14,8 +14,11 @@ from .messages import in_words
 from .plan import Study
 from .run import uplift_over_weight
 
-SECONDS_PER_STEP_AND_DOF = 1.2e-6
-"""Of a batch, whether it holds one case or nine: measured by `coralquake run p0` and `damping`; for the estimate of `check`."""
+SECONDS_PER_STEP_AND_DOF = 0.4e-6
+"""Of a batch, whether it holds one case or sixteen; for the estimate of `check`, measured by runs of `p0` and `damping`."""
+
+SECONDS_PER_STEP_AND_POINTS = 2.2e-8
+"""Of a case: the joint solve, which grows with the square of the joint points."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +36,13 @@ def advise(study: Study, workers: int) -> Advice:
 
 
 def bending_bound(spec: Spec) -> float:
-    """Upper bound of the bending stiffness of the walls in T3 over the true one (verification case 01).
+    """Upper bound of the bending stiffness of the walls over the true one (verification case 01); 1 with six-node triangles.
 
     1 + [3(1-nu)²/(1-2nu) - 1]/n² + 1.5(1-nu)(a/H)² for n elements through the wall H and elements of length a along it.
     """
     box, mesh = spec.box, spec.mesh
+    if mesh.order == 2:
+        return 1.0
     along = max((box.width - 2 * box.wall) / mesh.roof_elements, (box.height - 2 * box.wall) / mesh.side_elements)
     n, nu = mesh.wall_elements, box.nu
     return 1 + (3 * (1 - nu) ** 2 / (1 - 2 * nu) - 1) / n**2 + 1.5 * (1 - nu) * (along / box.wall) ** 2
@@ -50,15 +55,26 @@ def _facts(study: Study, model: Model, workers: int) -> list[tuple[str, str]]:
     steps = sum(_steps(spec) for spec in study.cases)
     batches = "1 batch" if len(study.batches) == 1 else f"{len(study.batches)} batches"
     return [
-        ("cases", f"{len(study.cases)} in {batches}, {steps:,} case-steps, about {_seconds(study, unknowns, workers):.0f} s"),
+        ("cases", f"{len(study.cases)} in {batches}, {steps:,} case-steps, about {_seconds(study, workers):.0f} s"),
         ("axes", ", ".join(f"{axis.name} ({len(axis.values)})" for axis in study.axes) or "none"),
         ("mesh", f"{_range(structure)} structure + {_range(joints)} joint + {_range(ground)} ground elements"),
         ("unknowns", f"{_range(unknowns)} degrees of freedom, {len(model.system.points)} joint points"),
         ("frequencies", ", ".join(f"{f:.4g}" for f in model.frequencies[:4]) + " Hz (joints closed)"),
-        ("bending bound", f"walls in T3 are at most {max(map(bending_bound, study.cases)):.3g} times too stiff in bending"),
+        ("bending", _bending_in_words(study)),
         ("uplift / weight", " to ".join(dict.fromkeys(f"{v:.3g}" for v in _uplift_range(study)))),
         ("results", f"about {in_bytes(results_bytes(study, model))} in memory"),
     ]
+
+
+def _bending_in_words(study: Study) -> str:
+    """What the elements make of a bent wall."""
+    if (bound := _largest_bound(study)) > 1:
+        return f"three-node triangles: walls at most {bound:.3g} times too stiff"
+    return "six-node triangles: right where a wall bends, see docs/mesh.md for the corners"
+
+
+def _largest_bound(study: Study) -> float:
+    return max(bending_bound(spec) for spec in study.cases)
 
 
 @dataclass(frozen=True)
@@ -96,17 +112,27 @@ def _range(counts: list[int]) -> str:
     return f"{low}" if low == high else f"{low} to {high}"
 
 
-def _seconds(study: Study, unknowns: list[int], workers: int) -> float:
+def _seconds_a_step(spec: Spec, n_case: int) -> float:
+    """Of a batch of some cases like `spec`."""
+    size = _size_of(spec)
+    points = size.joints * (spec.mesh.order if spec.joint.quadrature == "nodal" else 1)
+    return size.unknowns * SECONDS_PER_STEP_AND_DOF + n_case * points**2 * SECONDS_PER_STEP_AND_POINTS
+
+
+def _seconds(study: Study, workers: int) -> float:
     """About how long the batches take: as long as the longest of them at least."""
     each = [
-        n * max(_steps(study.cases[i]) for i in batch.cases) * SECONDS_PER_STEP_AND_DOF
-        for n, batch in zip(unknowns, study.batches, strict=True)
+        max(_steps(study.cases[i]) for i in batch.cases) * _seconds_a_step(study.cases[batch.cases[0]], len(batch.cases))
+        for batch in study.batches
     ]
     return max(1.0, *each, sum(each) / workers)
 
 
-FLOATS_A_POINT, OTHER_FLOATS = 5, 9
-"""Histories of a case: displacement and stress of a point; racking (3), shares of the joint (2), base and reference (2 each)."""
+FLOATS_A_POINT, OTHER_FLOATS = 9, 11
+"""Histories of a case: displacement, stress, principal stress of a point; racking (3), joint (4), base and reference (2 each)."""
+
+BYTES_A_JOINT, BYTES_A_SECTION = 9, 12
+"""State, pressure and slip; N, Q and M, in single precision."""
 
 
 def results_bytes(study: Study, model: Model) -> float:
@@ -114,7 +140,8 @@ def results_bytes(study: Study, model: Model) -> float:
     step = max(spec.time.dt * spec.output.every for spec in study.cases)
     kept = max(spec.time.duration for spec in study.cases) / step + 1
     points = len(model.system.mesh.probes)
-    history = 8 * (FLOATS_A_POINT * points + OTHER_FLOATS) + len(model.system.points)
+    history = 8 * (FLOATS_A_POINT * points + OTHER_FLOATS) + BYTES_A_JOINT * len(model.system.points)
+    history += BYTES_A_SECTION * len(model.system.mesh.sections)
     return len(study.cases) * (kept * history + 16 * len(model.system.mesh.nodes))
 
 
@@ -139,8 +166,9 @@ def _warnings(study: Study, model: Model) -> list[str]:
             f"time.dt = {longest:g} s gives {per_period:.1f} steps a period of the first mode ({first:.3g} Hz); "
             f"take {_rounded_down(0.1 / first):g} s or less"
         )
-    if (bound := max(bending_bound(case) for case in study.cases)) > 1.5:
-        found.append(f"the walls may be {bound:.1f} times too stiff in bending: read racking and wall stress as lower bounds")
+    if (bound := _largest_bound(study)) > 1.5:
+        stiff = f"the walls may be {bound:.1f} times too stiff in bending: read racking and wall stress as lower bounds"
+        found.append(f"{stiff}, or take mesh.order = 2")
     uplift = _uplift_range(study)[1]
     if uplift > 1:
         found.append(f"the net uplift of the pressure reaches {uplift:.3g} times the box's weight: it leaves its floor")
@@ -202,13 +230,13 @@ def _rounded_down(value: float) -> float:
 
 
 def _short_waves(study: Study) -> str:
-    """Which layers have an element longer than a sixth of the shortest shear wave that the motion and the step can carry."""
+    """Which layers have nodes further apart than a sixth of the shortest shear wave that the motion and the step can carry."""
     found: dict[int, tuple[float, float, float]] = {}
     for batch in study.batches:
         spec = study.cases[batch.cases[0]]
         highest = max(_highest_frequency(study, study.cases[i]) for i in batch.cases)
         for i, (layer, height) in enumerate(zip(spec.layer, _size_of(spec).heights, strict=True), 1):
-            limit = np.sqrt(layer.shear_modulus / layer.rho) / 6 / height if height else np.inf
+            limit = np.sqrt(layer.shear_modulus / layer.rho) / 6 / (height / spec.mesh.order) if height else np.inf
             if limit < highest:
                 found[i] = min(found.get(i, (np.inf, 0.0, 0.0)), (limit, height, highest))
     if not found:

@@ -16,6 +16,9 @@ from .messages import shown, table_rule
 
 MOST_CASES = 1_000_000
 
+OF_THE_RESULTS = ("output.sections",)
+"""Fields that decide the shape of the results, so that all cases share them."""
+
 TAKEN = ("frequency",)
 """Names of variables of the dataset that are also the last parts of fields: an axis is then called by the whole name."""
 
@@ -65,6 +68,8 @@ def swept_axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
             mistakes.append(f"sweep.{name}: {_no_field(name)}")
         elif not field.single:
             mistakes.append(f"sweep.{name}: holds several values and cannot be swept; write a study for each")
+        elif field.name in OF_THE_RESULTS:
+            mistakes.append(f"sweep.{name}: decides what the results hold and cannot be swept; write a study for each")
         elif field.name in axes:
             mistakes.append(f"sweep.{name}: {field.name} is swept already")
         else:

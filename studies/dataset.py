@@ -1,124 +1,20 @@
-"""The dataset of a study: its schema, and the way from the batches' responses to it (DESIGN's table, CF-1.11, UGRID-1.0)."""
+"""From the batches' responses to the dataset of a study (CF-1.11, UGRID-1.0)."""
 
-import platform
-import subprocess
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from hashlib import sha256
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from engine import PERIODS, Model, Response, Status
+from engine import PERIODS, Model, Response
+from engine.recorder import STRESSES
 from engine.simulate import OPENING, PENETRATION, PRESSURE, SLIP
+from engine.walls import Member, members
 
 from .axes import Along
 from .plan import Study
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One variable: dimensions after the study's axes, unit, long name, what it means.
-
-    flags : what its whole numbers stand for, by CF; -1 then marks what is not there
-    of_motion : whether it follows from the motion at the base, so that it carries only the axes along which that changes
-    """
-
-    dims: tuple[str, ...]
-    unit: str
-    long_name: str
-    meaning: str = ""
-    flags: tuple[str, ...] = ()
-    of_motion: bool = False
-
-    def attributes(self) -> dict[str, Any]:
-        """As netCDF attributes."""
-        found: dict[str, Any] = _attributes(self.unit, self.long_name, self.meaning)
-        if self.flags:
-            found["comment"] = "; ".join(part for part in (self.meaning, "-1: not there") if part)
-            found |= {"flag_values": np.arange(len(self.flags), dtype=np.int8), "flag_meanings": " ".join(self.flags)}
-        return found
-
-
-JOINT_STATES = ("open", "sticking", "slipping_forward", "slipping_backward")
-
-
-SCHEMA: dict[str, Variable] = {
-    "displacement": Variable(("time", "point", "component"), "m", "displacement relative to the base", "static state included"),
-    "stress": Variable(
-        ("time", "point", "stress_component"), "Pa", "stress", "tension positive, mean of the triangles at the point"
-    ),
-    "racking": Variable(("time",), "m", "racking of the box", "mean of roof corners minus mean of invert corners, horizontal"),
-    "racking_shear": Variable(("time",), "m", "racking of the box without its rigid rotation"),
-    "racking_free_field": Variable(
-        ("time",), "m", "racking of the free field", "layered column without the box, between the depths of roof and invert"
-    ),
-    "reference_displacement": Variable(
-        ("time", "component"),
-        "m",
-        "displacement of the free field at the depth of the record, relative to the base",
-        "zero where the record is the motion of the base",
-    ),
-    "open_fraction": Variable(("time",), "1", "share of the joint length that is open", "carries no pressure"),
-    "slip_fraction": Variable(("time",), "1", "share of the joint length that slips"),
-    "joint_state": Variable(("time", "joint"), "", "state of the joint points", flags=JOINT_STATES),
-    "max_opening": Variable(("joint",), "m", "largest opening of the joint"),
-    "max_slip": Variable(("joint",), "m", "largest slip of the joint"),
-    "max_pressure": Variable(("joint",), "Pa", "largest contact pressure of the joint"),
-    "first_slip": Variable(
-        ("joint",), "s", "time of the first slip", "beyond the elastic range before the shaking; NaN where it never slips"
-    ),
-    "gap_before_shaking": Variable(("joint",), "m", "gap before the shaking", "opening positive"),
-    "peak_displacement": Variable(("point", "component"), "m", "largest magnitude of displacement"),
-    "peak_displacement_dynamic": Variable(("point", "component"), "m", "the same minus the static state"),
-    "peak_stress": Variable(("point", "stress_component"), "Pa", "largest magnitude of stress"),
-    "peak_stress_dynamic": Variable(("point", "stress_component"), "Pa", "the same minus the static state"),
-    "peak_racking": Variable((), "m", "largest magnitude of racking"),
-    "peak_racking_dynamic": Variable((), "m", "the same minus the static state"),
-    "peak_racking_shear": Variable((), "m", "largest magnitude of racking without the rigid rotation"),
-    "peak_racking_free_field": Variable((), "m", "largest magnitude of the free field's racking"),
-    "shape": Variable(("node", "component"), "m", "displacement of all nodes at the moment of the largest racking"),
-    "shape_time": Variable((), "s", "moment of the largest racking"),
-    "shape_state": Variable(("joint",), "", "joint states at that moment", flags=JOINT_STATES),
-    "status": Variable((), "", "how the case ended", flags=tuple(status.name.lower() for status in Status)),
-    "reason": Variable((), "", "why the case failed"),
-    "iterations": Variable((), "1", "largest number of direct joint solves in a step"),
-    "residual": Variable((), "1", "largest relative residual of a joint solve"),
-    "source_test": Variable((), "1", "largest value of the source's convergence test", "correction over step, in the joints"),
-    "energy_error": Variable((), "1", "largest imbalance of energy", "over the largest sum of absolute terms"),
-    "contact_drift": Variable((), "1", "joint work that is neither stored nor dissipated", "shrinks with the time step"),
-    "penetration": Variable((), "m", "largest penetration of the penalty joints"),
-    "frequency": Variable(("mode",), "Hz", "natural frequencies with all joints closed and sticking"),
-    "base_acceleration": Variable(("time", "component"), "m/s2", "acceleration of the rigid base", of_motion=True),
-    "peak_base_acceleration": Variable(("component",), "m/s2", "largest magnitude of the base acceleration", of_motion=True),
-    "response_spectrum": Variable(
-        ("period", "component"),
-        "m/s2",
-        "pseudo-acceleration response spectrum of the base acceleration",
-        "damping ratio 0.05",
-        of_motion=True,
-    ),
-    "closed_before_shaking": Variable((), "1", "share of the joint length that carries pressure before the shaking"),
-    "uplift_over_weight": Variable(
-        (), "1", "net uplift of the water pressure over the box's weight", "9.81 m/s² or the study's own"
-    ),
-}
-
-COORDINATES: dict[str, Variable] = {
-    "time": Variable(("time",), "s", "time from the start of the motion"),
-    "period": Variable(("period",), "s", "natural period of the oscillator"),
-    "point_x": Variable(("point",), "m", "x of the point"),
-    "point_y": Variable(("point",), "m", "y of the point, the ground surface is 0"),
-    "joint_x": Variable(("joint",), "m", "x of the joint point"),
-    "joint_y": Variable(("joint",), "m", "y of the joint point"),
-    "joint_arc": Variable(("joint",), "m", "arc length round the box", "counter-clockwise from the lower left corner"),
-    "joint_length": Variable(("joint",), "m", "tributary length of the joint point"),
-    "joint_side": Variable(("joint",), "", "side of the box: floor, right wall, roof, left wall"),
-}
+from .provenance import provenance
+from .schema import COORDINATES, EXTREMES, SCHEMA, Variable, described
 
 
 def build_dataset(study: Study, models: Sequence[Model], parts: Sequence[dict[str, np.ndarray]], owner: np.ndarray) -> xr.Dataset:
@@ -131,27 +27,25 @@ def build_dataset(study: Study, models: Sequence[Model], parts: Sequence[dict[st
     for name, variable in SCHEMA.items():
         ds[name] = _variable(name, variable, study, parts, owner, grid)
     for axis in study.axes:
-        described = {axis.name: Along(axis.values, axis.unit, axis.meaning), **axis.along}
+        found = {axis.name: Along(axis.values, axis.unit, axis.meaning), **axis.along}
         ds = ds.assign_coords(
-            {name: (axis.name, list(a.values), _attributes(a.unit or "1", a.meaning)) for name, a in described.items()}
+            {name: (axis.name, list(a.values), described(a.unit or "1", a.meaning)) for name, a in found.items()}
         )
-    ds = ds.assign_coords(time=("time", grid, _attributes("s", COORDINATES["time"].long_name)))
+    ds = ds.assign_coords(time=("time", grid, described("s", COORDINATES["time"].long_name)))
     model = models[0]
     ds = ds.assign_coords(
         point=("point", list(model.system.mesh.probes)),
         component=("component", ["x", "y"]),
-        stress_component=("stress_component", ["xx", "yy", "xy"]),
-        period=("period", PERIODS, _attributes("s", COORDINATES["period"].long_name)),
+        stress_component=("stress_component", list(STRESSES)),
+        principal=("principal", [1, 2, 3]),
+        section=("section", list(model.system.mesh.sections)),
+        extreme=("extreme", list(EXTREMES)),
+        period=("period", PERIODS, described("s", COORDINATES["period"].long_name)),
         mode=("mode", np.arange(1, len(model.frequencies) + 1)),
     )
     ds = _with_mesh(ds, study, models, owner)
-    ds.attrs = _provenance(study)
+    ds.attrs = provenance(study)
     return ds
-
-
-def _attributes(unit: str, long_name: str, meaning: str = "") -> dict[str, str]:
-    found = {"units": unit, "long_name": long_name, "comment": meaning}
-    return {key: value for key, value in found.items() if value}
 
 
 def _common_time(parts: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
@@ -183,7 +77,7 @@ def _variable(
 def _typed(variable: Variable, values: Any) -> np.ndarray:
     """Whole numbers for flags, -1 where there is nothing; floats otherwise."""
     if not variable.flags:
-        return np.asarray(values, dtype=float)
+        return np.asarray(values, dtype=np.float32 if variable.single else np.float64)
     found = np.asarray(values, dtype=float)
     return np.where(np.isnan(found), -1, found).astype(np.int8)
 
@@ -213,31 +107,9 @@ def _stacked(values: list[np.ndarray]) -> np.ndarray:
 
 def case_arrays(model: Model, response: Response, extra: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Everything the schema asks of a batch, case first, and `time`. `extra` holds what the response does not know."""
-    r, recorder = response, response.recorder
-    length = model.system.points.length
-    closed = 1 - (r.static_open * length).sum(axis=1) / max(length.sum(), 1e-300)
-    n = len(r.status)
-    return {
+    r, n = response, len(response.status)
+    found = {
         "time": r.time,
-        "displacement": recorder.displacement(r.values),
-        "stress": recorder.stress(r.values),
-        "racking": r.values[..., recorder.racking],
-        "racking_shear": r.values[..., recorder.racking + 1],
-        "open_fraction": r.fractions[..., 0],
-        "slip_fraction": r.fractions[..., 1],
-        "joint_state": r.states,
-        "max_opening": r.joint_peaks[:, OPENING],
-        "max_slip": r.joint_peaks[:, SLIP],
-        "max_pressure": r.joint_peaks[:, PRESSURE],
-        "first_slip": r.first_slip,
-        "gap_before_shaking": r.static_gap,
-        "peak_displacement": recorder.displacement(r.peaks[:, 0]),
-        "peak_displacement_dynamic": recorder.displacement(r.peaks[:, 1]),
-        "peak_stress": recorder.stress(r.peaks[:, 0]),
-        "peak_stress_dynamic": recorder.stress(r.peaks[:, 1]),
-        "peak_racking": r.peaks[:, 0, recorder.racking],
-        "peak_racking_dynamic": r.peaks[:, 1, recorder.racking],
-        "peak_racking_shear": r.peaks[:, 0, recorder.racking + 1],
         "shape": r.shape,
         "shape_time": r.shape_time,
         "shape_state": r.shape_state,
@@ -248,10 +120,79 @@ def case_arrays(model: Model, response: Response, extra: dict[str, np.ndarray]) 
         "source_test": r.source_test,
         "energy_error": r.energy_error,
         "contact_drift": r.contact_drift,
-        "penetration": r.joint_peaks[:, PENETRATION].max(axis=1, initial=0.0),
         "frequency": np.repeat(model.frequencies[None], n, axis=0),
-        "closed_before_shaking": closed,
-        **extra,
+        "flexibility_ratio": np.full(n, model.flexibility_ratio),
+    }
+    found |= _of_points(r) | _of_racking(r, extra) | _of_sections(r) | _of_joints(model, r)
+    return found | extra
+
+
+def _of_points(r: Response) -> dict[str, np.ndarray]:
+    """Displacements and stresses."""
+    recorder = r.recorder
+    stress = recorder.stress(r.values)
+    return {
+        "displacement": recorder.displacement(r.values),
+        "stress": stress,
+        "principal_stress": principal(stress),
+        "peak_displacement": recorder.displacement(r.peaks[:, 0]),
+        "peak_displacement_dynamic": recorder.displacement(r.peaks[:, 1]),
+        "peak_stress": recorder.stress(r.peaks[:, 0]),
+        "peak_stress_dynamic": recorder.stress(r.peaks[:, 1]),
+        "max_principal_stress": r.principal_extremes[:, 0],
+        "min_principal_stress": r.principal_extremes[:, 1],
+    }
+
+
+def principal(stress: np.ndarray) -> np.ndarray:
+    """Principal stresses (…, 3), the largest first, of stresses (…, 4) xx, yy, xy, zz."""
+    xx, yy, xy, zz = np.moveaxis(stress, -1, 0)
+    mean, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    return -np.sort(-np.stack([mean + radius, mean - radius, zz], axis=-1), axis=-1)
+
+
+def _of_racking(r: Response, extra: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Racking, and that without static part and rotation over the peak of the free field, where a horizontal motion racks it."""
+    row, shear = r.recorder.racking, r.recorder.racking + 1
+    racked = (extra["peak_base_acceleration"][:, 0] > 0) & (extra["peak_racking_free_field"] > 0)
+    return {
+        "racking": r.values[..., row],
+        "racking_shear": r.values[..., shear],
+        "peak_racking": r.peaks[:, 0, row],
+        "peak_racking_dynamic": r.peaks[:, 1, row],
+        "peak_racking_shear": r.peaks[:, 0, shear],
+        "racking_ratio": r.peaks[:, 1, shear] / np.where(racked, extra["peak_racking_free_field"], np.nan),
+    }
+
+
+def _of_sections(r: Response) -> dict[str, np.ndarray]:
+    """N, Q and M in time and at the moments of their extremes."""
+    found = {"extreme_time": r.section_times}
+    for i, name in enumerate(("axial_force", "shear_force", "bending_moment")):
+        found |= {name: r.section_forces[..., i], f"extreme_{name}": r.section_extremes[..., i]}
+    return found
+
+
+def _of_joints(model: Model, r: Response) -> dict[str, np.ndarray]:
+    """What the joint does in time, and its extremes round the box."""
+    length = model.system.points.length
+    whole = max(length.sum(), 1e-300)
+    return {
+        "open_fraction": r.fractions[..., 0],
+        "opened_length": r.fractions[..., 0] * whole,
+        "slip_fraction": r.fractions[..., 1],
+        "slip_work": r.friction_work,
+        "joint_state": r.states,
+        "joint_pressure": r.pressure,
+        "joint_slip": r.slip,
+        "joint_slip_work": r.joint_work / length,
+        "max_opening": r.joint_peaks[:, OPENING],
+        "max_slip": r.joint_peaks[:, SLIP],
+        "max_pressure": r.joint_peaks[:, PRESSURE],
+        "penetration": r.joint_peaks[:, PENETRATION].max(axis=1, initial=0.0),
+        "first_slip": r.first_slip,
+        "gap_before_shaking": r.static_gap,
+        "closed_before_shaking": 1 - (r.static_open * length).sum(axis=1) / whole,
     }
 
 
@@ -268,19 +209,27 @@ def _with_mesh(ds: xr.Dataset, study: Study, models: Sequence[Model], owner: np.
         axes, values = _varying(study, [np.asarray(of(model)) for model in models], owner)
         return (*axes, *dims), values, attrs
 
-    described = {
-        name: varying(COORDINATES[name].dims, of, _attributes(*_facts(COORDINATES[name]))) for name, of in _PLACES.items()
-    }
+    places = {name: varying(COORDINATES[name].dims, of, described(*_facts(COORDINATES[name]))) for name, of in _PLACES.items()}
     for i, name in enumerate(("mesh_node_x", "mesh_node_y")):
         attrs = {"units": "m", "long_name": f"{'xy'[i]} of the node"}
-        described[name] = varying(("node",), _coordinate(i), attrs)
-    ds = ds.assign_coords(described)
+        places[name] = varying(("node",), _coordinate(i), attrs)
+    ds = ds.assign_coords(places)
     ds["mesh"] = xr.Variable((), np.int32(0), _TOPOLOGY)
     for name, dims, of, attrs in _CONNECTIVITY:
         ds[name] = varying(dims, of, attrs)
     for name, location in (("mesh_layer", "face"), ("shape", "node")):
         ds[name].attrs |= {"mesh": "mesh", "location": location}
     return ds
+
+
+def _places_of_sections(model: Model) -> list[tuple[Member, float]]:
+    """Member and distance [m] along its clear span, from the left or lower end, of every section."""
+    found, by_name = [], {member.name: member for member in members(model.spec.box)}
+    for name, section in model.system.mesh.sections.items():
+        member = by_name[name.rpartition(" ")[0]]
+        distance = float((np.array([section.x, section.y]) - member.start) @ member.along)
+        found.append((member, distance if member.forwards else member.span - distance))
+    return found
 
 
 def _coordinate(i: int) -> Callable[[Model], Any]:
@@ -295,6 +244,10 @@ _PLACES: dict[str, Callable[[Model], Any]] = {
     "joint_arc": lambda m: m.system.points.arc,
     "joint_length": lambda m: m.system.points.length,
     "joint_side": lambda m: joint_sides(m),
+    "section_x": lambda m: [section.x for section in m.system.mesh.sections.values()],
+    "section_y": lambda m: [section.y for section in m.system.mesh.sections.values()],
+    "section_member": lambda m: [member.name for member, _ in _places_of_sections(m)],
+    "section_position": lambda m: [position for _, position in _places_of_sections(m)],
 }
 
 _TOPOLOGY = {
@@ -310,8 +263,8 @@ _CONNECTIVITY: tuple[tuple[str, tuple[str, ...], Callable[[Model], Any], dict[st
     (
         "mesh_face_nodes",
         ("face", "corner"),
-        lambda m: m.system.mesh.triangles.astype(np.int32),
-        {"cf_role": "face_node_connectivity", "start_index": np.int32(0), "long_name": "nodes of the triangle"},
+        lambda m: outline(m.system.mesh.triangles).astype(np.int32),
+        {"cf_role": "face_node_connectivity", "start_index": np.int32(0), "long_name": "nodes of the triangle, round it"},
     ),
     (
         "mesh_layer",
@@ -323,9 +276,14 @@ _CONNECTIVITY: tuple[tuple[str, tuple[str, ...], Callable[[Model], Any], dict[st
         "joint_nodes",
         ("joint", "joint_corner"),
         lambda m: m.system.points.nodes.astype(np.int32),
-        {"long_name": "nodes of the joint element: 1-2 ground, 3-4 structure"},
+        {"long_name": "nodes of the joint element: 1-2 ground, 3-4 structure, with six nodes then the middle ones"},
     ),
 )
+
+
+def outline(triangles: np.ndarray) -> np.ndarray:
+    """Nodes of triangles (n, 3 or 6) in the order in which they lie round them: a six-node one is a polygon of six."""
+    return triangles if triangles.shape[1] == 3 else triangles[:, [0, 3, 1, 4, 2, 5]]
 
 
 def _varying(study: Study, values: list[np.ndarray], owner: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
@@ -350,51 +308,3 @@ def _along_what_changes(study: Study, values: np.ndarray) -> tuple[tuple[str, ..
 
 def _facts(variable: Variable) -> tuple[str, str, str]:
     return variable.unit, variable.long_name, variable.meaning
-
-
-def _provenance(study: Study) -> dict[str, str]:
-    packages = ("coralquake", "numpy", "numba", "scipy", "xarray", "netCDF4", "pandas")
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    records = ", ".join(f"{name} {sha256(m.acceleration.tobytes()).hexdigest()}" for name, m in study.motions.items())
-    return {
-        "Conventions": "CF-1.11 UGRID-1.0",
-        "title": study.title,
-        "study_name": study.name,
-        "study": study.text,
-        "study_hash": study_hash(study),
-        "records_sha256": records or "none",
-        "package_versions": ", ".join(f"{package} {version(package)}" for package in packages),
-        "commit": _commit(),
-        "platform": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
-        "created": now,
-        "history": f"{now} computed by coralquake {version('coralquake')}",
-    }
-
-
-def _commit() -> str:
-    """Commit of the checkout that the program runs from, 'unknown' elsewhere."""
-    folder = Path(__file__).parents[1]
-    if not (folder / ".git").exists():  # an installed package may lie inside another project's checkout
-        return "unknown"
-    try:
-        answer = subprocess.run(
-            ["git", "-C", str(folder), "rev-parse", "HEAD"], capture_output=True, text=True, timeout=5, check=True
-        )
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"
-    return answer.stdout.strip()
-
-
-def study_hash(study: Study) -> str:
-    """Digest of all that decides the result: cases, records, the engine's sources, versions of the numerical packages."""
-    digest = sha256()
-    for spec in study.cases:
-        digest.update(spec.model_dump_json().encode())
-    for name, motion in study.motions.items():
-        digest.update(f"{name} {motion.dt!r}".encode() + motion.acceleration.tobytes())
-    digest.update(repr([(axis.name, axis.values) for axis in study.axes]).encode() + study.title.encode())
-    for folder in (Path(__file__).parent, Path(__file__).parent.parent / "engine"):
-        for source in sorted(folder.rglob("*.py")):
-            digest.update(source.read_bytes())
-    digest.update(" ".join(version(package) for package in ("numpy", "scipy", "numba")).encode())
-    return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""A dataset as a table, one row a case, and as three sentences."""
+"""A dataset as a table, one row a case, and as four sentences."""
 
 import numpy as np
 import pandas as pd
@@ -24,18 +24,23 @@ def cases_of(ds: xr.Dataset) -> xr.Dataset:
 def table(ds: xr.Dataset) -> pd.DataFrame:
     """One row a case: the axes, how it ended, the peaks a designer asks for first. SI units, named in the columns.
 
-    The racking ratio is peak racking over the free field's; `closed before` the share of the joint that bears before the shaking.
+    `closed before` is the share of the joint that bears before the shaking; the moment is the largest in magnitude of all
+    sections, with its axial force.
     """
     cases = cases_of(ds)
+    moment, section, axial, _ = largest_moment(cases)
     columns = {_with_unit(name, cases[name].attrs["units"]): cases[name].values for name in axes_of(ds)}
     columns |= {
         "status": cases["status"].values,
         "closed before [1]": cases["closed_before_shaking"].values,
         "u_x at A [m]": cases["peak_displacement"].sel(point="A", component="x").values,
         "racking [m]": cases["peak_racking"].values,
-        "racking ratio [1]": _ratio(cases),
+        "racking ratio [1]": cases["racking_ratio"].values,
         "opening [m]": cases["max_opening"].max("joint").values,
         "slip [m]": cases["max_slip"].max("joint").values,
+        "moment [Nm/m]": moment,
+        "section": section,
+        "N then [N/m]": axial,
         "stress xx at C [Pa]": cases["peak_stress"].sel(point="C", stress_component="xx").values,
         "energy error [1]": cases["energy_error"].values,
     }
@@ -46,10 +51,19 @@ def _with_unit(name: str, unit: str) -> str:
     return name if unit == "1" else f"{name} [{unit.replace('**', '')}]"
 
 
-def _ratio(cases: xr.Dataset) -> np.ndarray:
-    """Peak racking over the free field's, NaN where that is zero."""
-    free = cases["peak_racking_free_field"].values
-    return cases["peak_racking"].values / np.where(free > 0, free, np.nan)
+def largest_moment(cases: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of each case the bending moment [Nm/m] largest in magnitude, its section, the axial force [N/m] with it, and when [s]."""
+    if not cases.sizes["section"]:
+        nothing = np.full(cases.sizes["case"], np.nan)
+        return nothing, np.full(len(nothing), ""), nothing, nothing
+    stacked = cases.stack(place=("section", "extreme"), create_index=False).transpose("case", "place", ...)
+    moments = stacked["extreme_bending_moment"].values
+    chosen = np.abs(np.nan_to_num(moments)).argmax(axis=1)
+    row = np.arange(len(chosen))
+    names = stacked["section"].values[chosen].astype(object)
+    names[np.isnan(moments[row, chosen])] = ""
+    axial, times = (stacked[name].values[row, chosen] for name in ("extreme_axial_force", "extreme_time"))
+    return moments[row, chosen], names, axial, times
 
 
 def failures(ds: xr.Dataset) -> list[str]:
@@ -64,13 +78,14 @@ def failures(ds: xr.Dataset) -> list[str]:
 
 
 def sentences(ds: xr.Dataset) -> list[str]:
-    """Three sentences from the data: the state before the shaking, the first slip, the racking."""
+    """Four sentences from the data: the state before the shaking, the first slip, the racking, the largest bending moment."""
     done = cases_of(ds)
     axes = axes_of(ds) if done.sizes["case"] > 1 else []
     done = done.isel(case=np.flatnonzero(done["status"].values <= Status.SUBSTEPS))
     if done.sizes["case"] == 0:
         return ["No case of this study has come to its end."]
-    return [_before_shaking(done, axes), _first_slip(done, axes), _racking(done, axes)]
+    found = [_before_shaking(done, axes), _first_slip(done, axes), _racking(done, axes)]
+    return [*found, *_bending(done, axes)]
 
 
 def _at(cases: xr.Dataset, axes: list[str], i: int) -> str:
@@ -125,11 +140,20 @@ def _first_slip(cases: xr.Dataset, axes: list[str]) -> str:
 
 
 def _racking(cases: xr.Dataset, axes: list[str]) -> str:
-    ratio = _ratio(cases)
+    ratio = cases["racking_ratio"].values
     if np.isnan(ratio).all():
         return "There is no horizontal motion that would rack the free field."
     low, high = int(np.nanargmin(ratio)), int(np.nanargmax(ratio))
     if ratio[low] == ratio[high]:
-        return f"Peak racking is {ratio[low]:.2g} × the free field's{_at(cases, axes, low)}."
+        return f"The box racks {ratio[low]:.2g} × as much as the free field{_at(cases, axes, low)}."
     most = f"{ratio[high]:.2g} ×{_at(cases, axes, high)}"
-    return f"Peak racking is {ratio[low]:.2g} × the free field's{_at(cases, axes, low)} and {most}."
+    return f"The box racks {ratio[low]:.2g} × as much as the free field{_at(cases, axes, low)} and {most}."
+
+
+def _bending(cases: xr.Dataset, axes: list[str]) -> list[str]:
+    if not cases.sizes["section"]:
+        return []
+    moment, section, axial, time = largest_moment(cases)
+    i = int(np.abs(moment).argmax())
+    value = f"{in_words(1e-3 * moment[i], 'kNm/m')} ({section[i]}, {time[i]:.2f} s, N = {in_words(1e-3 * axial[i], 'kN/m')})"
+    return [f"The largest bending moment is {value}{_at(cases, axes, i)}."]

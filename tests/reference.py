@@ -2,14 +2,16 @@
 
 It reads a mesh as arrays and shares no code with `engine`. A step is full Newton-Raphson with the consistent tangent; where that
 cycles, Katzenelson's method takes over: the equations are piecewise linear, so the path u(t) of F(u) = (1 - t) F(u_0) is a
-polygon that can be walked exactly, from one set of joint states into the next. Coincident joint points are not merged.
+polygon that can be walked exactly, from one set of joint states into the next. Coincident joint points are not merged. Triangles
+have straight sides, three nodes or six.
 """
 
 from collections import namedtuple
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.linalg import det, inv, norm
+from numpy.linalg import inv, norm
+from numpy.polynomial.legendre import leggauss
 from scipy.sparse.linalg import spsolve as solve
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
@@ -117,29 +119,57 @@ def joints_of(whole, joint_materials):
     return Joints(whole.B, k_n * whole.area, k_s * whole.area, mu, 0 * mu)
 
 
+def powers(xy, n):
+    """1, x, y and for six nodes x², xy, y² at places (m, 2), (m, n); and their derivatives by x and y (2, m, n)."""
+    x, y = np.transpose(xy)
+    o, e = 0 * x, 0 * x + 1
+    values, by_x, by_y = [e, x, y, x * x, x * y, y * y], [o, e, o, 2 * x, y, o], [o, o, e, o, x, 2 * y]
+    return np.transpose(values[:n]), np.array([np.transpose(by_x[:n]), np.transpose(by_y[:n])])
+
+
+def element(xy, E, nu, rho):
+    """Stiffness (2n, 2n) and mass (n, n) of a triangle with straight sides, of unit thickness, from polynomials in x and y."""
+    n, middle, size = len(xy), xy[:3].mean(axis=0), np.ptp(xy[:3])
+    t, w = leggauss(4)
+    r, s = (axis.ravel() for axis in np.meshgrid((t + 1) / 2, (t + 1) / 2))  # a square, folded into the triangle
+    places = np.column_stack([r, s * (1 - r), (1 - s) * (1 - r)]) @ xy[:3]
+    (ax, ay), (bx, by) = xy[1] - xy[0], xy[2] - xy[0]
+    weights = np.outer(w, w).ravel() / 4 * (1 - r) * (ax * by - ay * bx)
+    coefficients = inv(powers((xy - middle) / size, n)[0])
+    values, slopes = powers((places - middle) / size, n)
+    N, (x, y) = values @ coefficients, slopes @ coefficients / size
+    strain = np.zeros((len(places), 3, 2 * n))
+    strain[:, 0, 0::2], strain[:, 1, 1::2], strain[:, 2, 0::2], strain[:, 2, 1::2] = x, y, y, x
+    D = E * nu / ((1 + nu) * (1 - 2 * nu)) * np.outer([1, 1, 0], [1, 1, 0]) + E / (2 * (1 + nu)) * np.diag([2, 2, 1])
+    return np.einsum("q,qai,ab,qbj->ij", weights, strain, D, strain), rho * np.einsum("q,qi,qj->ij", weights, N, N)
+
+
+def along(x, n):
+    """Shape functions (n,) at x from 0 to 1 on a side of n nodes: ends, then the middle."""
+    return np.array([1 - x, x] if n == 2 else [(1 - x) * (1 - 2 * x), x * (2 * x - 1), 4 * x * (1 - x)])
+
+
 def assemble(mesh, materials, fixed, master, quadrature="nodal", lumped=False, thickness=1.0):
     """The whole system of a mesh (D1, D2), whose degrees of freedom move as `master` does and not at all where `fixed`."""
     n = 2 * len(mesh.nodes)
     K, M = np.zeros((n, n)), np.zeros((n, n))
     for corners, index in zip(mesh.triangles, mesh.material, strict=True):
         E, nu, rho = materials[index].E, materials[index].nu, materials[index].rho
-        square = np.column_stack([np.ones(3), mesh.nodes[corners]])
-        volume, (x, y) = thickness * det(square) / 2, inv(square)[1:]
-        strain = np.zeros((3, 6))
-        strain[0, 0::2], strain[1, 1::2], strain[2, 0::2], strain[2, 1::2] = x, y, y, x
-        D = E * nu / ((1 + nu) * (1 - 2 * nu)) * np.outer([1, 1, 0], [1, 1, 0]) + E / (2 * (1 + nu)) * np.diag([2, 2, 1])
-        middles = (1 - np.eye(3)) / 2  # N at the middles of the sides, where the rule is exact for products of N
-        m = rho * volume / 3 * middles @ middles
+        k, m = element(mesh.nodes[corners], E, nu, rho)
         dofs = (2 * corners[:, None] + [0, 1]).ravel()
-        K[np.ix_(dofs, dofs)] += volume * strain.T @ D @ strain
-        M[np.ix_(dofs, dofs)] += np.kron(np.diag(m.sum(axis=1)) if lumped else m, np.eye(2))
-    places = [(0.5, 1.0)] if quadrature == "one-point" else [(0.0, 0.5), (1.0, 0.5)]
+        K[np.ix_(dofs, dofs)] += thickness * k
+        M[np.ix_(dofs, dofs)] += thickness * np.kron(np.diag(m.sum(axis=1)) if lumped else m, np.eye(2))
+    width = mesh.triangles.shape[1] // 3 + 1
+    nodal = [(0.0, 1 / 2), (1.0, 1 / 2)] if width == 2 else [(0.0, 1 / 6), (0.5, 4 / 6), (1.0, 1 / 6)]
+    places = [(0.5, 1.0)] if quadrature == "one-point" else nodal
     found = [(e, x, share) for e in range(len(mesh.joints)) for x, share in places]
     B, area = np.zeros((2 * len(found), n)), np.zeros(len(found))
     for row, (e, x, share) in enumerate(found):
-        along = mesh.nodes[mesh.joints[e][1]] - mesh.nodes[mesh.joints[e][0]]
-        area[row], (c, s) = share * thickness * norm(along), along / norm(along)
-        for node, N in zip(mesh.joints[e], (x - 1, -x, x, 1 - x), strict=True):
+        side = mesh.nodes[mesh.joints[e][1]] - mesh.nodes[mesh.joints[e][0]]
+        area[row], (c, s) = share * thickness * norm(side), side / norm(side)
+        N = along(x, width)
+        both = [*-N[:2], *N[1::-1], *-N[2:], *N[2:]]
+        for node, N in zip(mesh.joints[e], both, strict=True):
             B[2 * row : 2 * row + 2, 2 * node : 2 * node + 2] += N * np.array([[-s, c], [c, s]])
     group = (2 * master + [0, 1]).ravel()
     owner = np.setdiff1d(group, group[fixed.ravel()])
@@ -149,13 +179,13 @@ def assemble(mesh, materials, fixed, master, quadrature="nodal", lumped=False, t
 
 
 def pressure_load(whole, mesh, pressure, thickness=1.0):
-    """Load of a nodal pressure on the pressure edges, to their left, by Gauss's two points on every edge."""
+    """Load of a nodal pressure on the pressure edges, to their left, by Gauss's three points on every edge."""
     load = np.zeros((len(mesh.nodes), 2))
     for edge in mesh.pressure_edges:
         dx, dy = mesh.nodes[edge[1]] - mesh.nodes[edge[0]]
-        for x in 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3):
-            N = np.array([1 - x, x])
-            load[edge] += np.outer(N, [-dy, dx]) * (N @ pressure[edge]) * thickness / 2
+        for x, weight in zip(*leggauss(3), strict=True):
+            N = along((x + 1) / 2, len(edge))
+            load[edge] += np.outer(N, [-dy, dx]) * (N @ pressure[edge]) * thickness * weight / 2
     return whole.T.T @ load.ravel()
 
 

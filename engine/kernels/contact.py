@@ -9,10 +9,11 @@ along a path (`follow`).
 
 import numpy as np
 
+from .direct import EQUATION_TOLERANCE, direct
 from .follow import follow
-from .jit import kernel
+from .jit import kernel, summing_kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
-from .states import EQUATION_TOLERANCE, Kept, Points, direct
+from .states import Kept, Points
 
 UNIT_ROUNDOFF = 2.0**-53
 STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep the state they have
@@ -61,7 +62,7 @@ def _project(force, mu, swept):
         swept[2 * p + 1] = max(mu[p] * normal, min(-mu[p] * normal, force[2 * p + 1]))
 
 
-@kernel
+@summing_kernel
 def _rounding(G, g_free, lam, product):
     """Relative residual that the rounding of G lambda alone can cause; where G is nearly singular it exceeds the tolerance."""
     total = free = scale = 0.0
@@ -76,7 +77,7 @@ def _rounding(G, g_free, lam, product):
     return 0.0 if scale == 0.0 else lam.shape[0] * UNIT_ROUNDOFF * np.sqrt(total / scale)
 
 
-@kernel
+@summing_kernel
 def _sweep(points, g_free, lam, proposal):
     """One block Gauss-Seidel sweep over the points: lam and the proposed states are updated in place."""
     G = points.G
@@ -108,7 +109,7 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     Returns (rounds, residual): how many direct solves it took, -1 where `max_rounds` did not do, and the relative residual.
     """
     points = Points(G, law.k_n[lane], law.k_s[lane], law.mu[lane], slip)
-    kept = Kept(work.lu[lane], work.pivot[lane], work.factored[lane], work.unknown, work.product)
+    kept = Kept(work.lu[lane], work.pivot[lane], work.factored[lane], work.unknown, work.product, work.change)
     proposal, g_tol = work.proposal, STATE_TOLERANCE * _largest(g_free)
     work.swept[:] = lam
     proposal[:] = state

@@ -7,9 +7,9 @@ leads to g_free; where the solution is unique it can neither return to its start
 
 import numpy as np
 
+from .direct import direct
 from .jit import kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, slip_sign
-from .states import direct
 
 MAX_PIECES = 40
 """Pieces of the path a joint point."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from .contact import solve_lane, source_test
 from .jit import LANES, kernel
-from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, slip_after
+from .joint import slip_after
 
 INPUT, KINETIC, STRAIN, DAMPING, JOINT, JOINT_ELASTIC, FRICTION, JOINT_DAMPING = range(8)
 """Rows of the energy account: work of the loads, stored, stored, dissipated, work of the joints and what it consists of."""
@@ -44,12 +44,14 @@ class Motion(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Joints of every lane: gap, force of the law, force of the dashpots (LANES, 2 n_point); slip, state (LANES, n_point)."""
+    """Joints of every lane: gap, force of the law, force of the dashpots (LANES, 2 n_point); slip, friction work done since the
+    static stage, state (LANES, n_point)."""
 
     gap: np.ndarray
     force: np.ndarray
     damped: np.ndarray
     slip: np.ndarray
+    work: np.ndarray
     state: np.ndarray
 
 
@@ -119,7 +121,9 @@ def commit_joints(law, slope, offset, n_lane, found, contact, energy):
             elastic += 0.5 * force**2 / (law.k_s[lane, p] if tangential else law.k_n[lane, p])
             if tangential:
                 slip = slip_after(found.state[lane, p], gap, force, contact.slip[lane, p], law.k_s[lane, p])
-                energy[FRICTION, lane] += force * (slip - contact.slip[lane, p])
+                work = force * (slip - contact.slip[lane, p])
+                energy[FRICTION, lane] += work
+                contact.work[lane, p] += work
                 contact.slip[lane, p] = slip
             before = contact.force[lane, i] + contact.damped[lane, i]
             energy[JOINT, lane] += 0.5 * (before + force + damped) * step
@@ -167,22 +171,6 @@ def commit(rates, loads, ground, rhs, u, Mu, motion, energy):
 
 
 @kernel
-def joint_fractions(state, length, n_lane, fraction):
-    """Share of the joint length that is open, and that slips: fraction (2, LANES), length (n_point,)."""
-    for lane in range(n_lane):
-        open_length = slip_length = total = 0.0
-        for p in range(length.shape[0]):
-            total += length[p]
-            if state[lane, p] == OPEN:
-                open_length += length[p]
-            elif state[lane, p] == SLIP_FORWARD or state[lane, p] == SLIP_BACKWARD:
-                slip_length += length[p]
-        if total > 0.0:
-            fraction[0, lane] = open_length / total
-            fraction[1, lane] = slip_length / total
-
-
-@kernel
 def audit(energy, start, account):
     """Keep the worst of the energy balance (D11): account (3, LANES) = largest imbalance, contact drift, sum of absolute terms.
 
@@ -198,37 +186,3 @@ def audit(energy, start, account):
         account[0, c] = max(account[0, c], abs(stored + released - energy[INPUT, c]))
         account[1, c] = max(account[1, c], abs(drift))
         account[2, c] = max(account[2, c], terms)
-
-
-@kernel
-def observe(values, standing, peaks, watched, record_holder):
-    """Update peaks (2, n, LANES), total and minus the static values `standing` (n, LANES).
-
-    record_holder (LANES,) tells the lanes in which entry `watched` has just reached its largest magnitude.
-    """
-    for i in range(values.shape[0]):
-        for c in range(LANES):
-            size = abs(values[i, c])
-            if i == watched:
-                record_holder[c] = size > peaks[0, i, c]
-            peaks[0, i, c] = max(peaks[0, i, c], size)
-            peaks[1, i, c] = max(peaks[1, i, c], abs(values[i, c] - standing[i, c]))
-
-
-@kernel
-def observe_joints(contact, area, n_lane, time, slip_before, elastic_range, peaks, first_slip):
-    """Update peaks (4, LANES, n_point) of opening, slip, pressure, penetration, and when each point first slid (LANES, n_point).
-
-    A point has slid once its slip differs from that before the shaking by more than `elastic_range` (LANES, n_point), the
-    tangential displacement it could take without sliding then.
-    """
-    for lane in range(n_lane):
-        for p in range(area.shape[0]):
-            gap, slip = contact.gap[lane, 2 * p], contact.slip[lane, p]
-            peaks[0, lane, p] = max(peaks[0, lane, p], gap)
-            peaks[1, lane, p] = max(peaks[1, lane, p], abs(slip))
-            peaks[2, lane, p] = max(peaks[2, lane, p], -contact.force[lane, 2 * p] / area[p])
-            peaks[3, lane, p] = max(peaks[3, lane, p], -gap)
-            closed = contact.state[lane, p] != OPEN
-            if closed and np.isnan(first_slip[lane, p]) and abs(slip - slip_before[lane, p]) > elastic_range[lane, p]:
-                first_slip[lane, p] = time

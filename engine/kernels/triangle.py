@@ -1,29 +1,94 @@
-"""The three-node triangle in plane strain: stiffness, mass, stress (D1). Unit-neutral."""
+"""Triangles of three or six nodes in plane strain: stiffness, mass, stress (D1). Unit-neutral.
+
+Nodes 1-3 are the corners, counter-clockwise; 4-6 the middles of the sides 1-2, 2-3, 3-1, which may be curved (isoparametric).
+Places in a triangle are barycentric: `at` (3,) are the shares of the corners. The number of nodes n is read from the arrays.
+"""
+
+from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from .jit import kernel
 
+_NEAR = (8 - sqrt(10) + sqrt(38 - 44 * sqrt(0.4))) / 18
+_FAR = (8 - sqrt(10) - sqrt(38 - 44 * sqrt(0.4))) / 18
+_HALF = sqrt(213125 - 53320 * sqrt(10)) / 3720
+RULE = (
+    (_NEAR, _NEAR, 1 - 2 * _NEAR, 1 / 6 + _HALF),
+    (_NEAR, 1 - 2 * _NEAR, _NEAR, 1 / 6 + _HALF),
+    (1 - 2 * _NEAR, _NEAR, _NEAR, 1 / 6 + _HALF),
+    (_FAR, _FAR, 1 - 2 * _FAR, 1 / 6 - _HALF),
+    (_FAR, 1 - 2 * _FAR, _FAR, 1 / 6 - _HALF),
+    (1 - 2 * _FAR, _FAR, _FAR, 1 / 6 - _HALF),
+)
+"""Quadrature: place and weight of six points, exact to degree 4 (Strang and Fix 1973), so for the mass of straight sides too."""
+
+
+class Solids(NamedTuple):
+    """Triangles with their materials: nodes (n_node, 2); triangles (n_triangle, 3 or 6); E, nu, rho (n_triangle,); thickness."""
+
+    nodes: np.ndarray
+    triangles: np.ndarray
+    E: np.ndarray
+    nu: np.ndarray
+    rho: np.ndarray
+    thickness: float
+
 
 @kernel
-def area(xy):
-    """Signed area of one triangle with corners `xy` (3, 2); positive where they run counter-clockwise."""
-    return 0.5 * ((xy[1, 0] - xy[0, 0]) * (xy[2, 1] - xy[0, 1]) - (xy[2, 0] - xy[0, 0]) * (xy[1, 1] - xy[0, 1]))
-
-
-@kernel
-def strain_matrix(xy, B):
-    """Fill B (3, 6): (eps_xx, eps_yy, gamma_xy) = B (u1x, u1y, u2x, u2y, u3x, u3y)."""
-    double_area = 2.0 * area(xy)
-    B[:, :] = 0.0
+def shape(at, N):
+    """Fill N (n,), the shape functions at a place."""
+    if N.shape[0] == 3:
+        N[:] = at
+        return
     for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        dx = (xy[j, 1] - xy[k, 1]) / double_area
-        dy = (xy[k, 0] - xy[j, 0]) / double_area
-        B[0, 2 * i] = dx
-        B[1, 2 * i + 1] = dy
-        B[2, 2 * i] = dy
-        B[2, 2 * i + 1] = dx
+        N[i] = at[i] * (2.0 * at[i] - 1.0)
+        N[3 + i] = 4.0 * at[i] * at[(i + 1) % 3]
+
+
+@kernel
+def shape_slopes(at, dN):
+    """Fill dN (n, 2), the derivatives of the shape functions by the first and the second barycentric coordinate."""
+    slope = ((1.0, 0.0), (0.0, 1.0), (-1.0, -1.0))
+    for i in range(3):
+        j = (i + 1) % 3
+        for a in range(2):
+            if dN.shape[0] == 3:
+                dN[i, a] = slope[i][a]
+            else:
+                dN[i, a] = (4.0 * at[i] - 1.0) * slope[i][a]
+                dN[3 + i, a] = 4.0 * (at[i] * slope[j][a] + at[j] * slope[i][a])
+
+
+@kernel
+def gradients(xy, at, dN):
+    """Fill dN (n, 2), the derivatives of the shape functions by x and y; the map's determinant (twice the area) is returned."""
+    shape_slopes(at, dN)
+    xx = xy_ = yx = yy = 0.0
+    for i in range(xy.shape[0]):
+        xx += dN[i, 0] * xy[i, 0]
+        xy_ += dN[i, 0] * xy[i, 1]
+        yx += dN[i, 1] * xy[i, 0]
+        yy += dN[i, 1] * xy[i, 1]
+    determinant = xx * yy - xy_ * yx
+    for i in range(xy.shape[0]):
+        first, second = dN[i, 0], dN[i, 1]
+        dN[i, 0] = (yy * first - xy_ * second) / determinant
+        dN[i, 1] = (xx * second - yx * first) / determinant
+    return determinant
+
+
+@kernel
+def strain_matrix(xy, at, B):
+    """Fill B (3, 2n): (eps_xx, eps_yy, gamma_xy) = B (u1x, u1y, u2x, …); the determinant of the map is returned."""
+    dN = np.empty((xy.shape[0], 2))
+    determinant = gradients(xy, at, dN)
+    B[:, :] = 0.0
+    for i in range(xy.shape[0]):
+        B[0, 2 * i] = B[2, 2 * i + 1] = dN[i, 0]
+        B[1, 2 * i + 1] = B[2, 2 * i] = dN[i, 1]
+    return determinant
 
 
 @kernel
@@ -38,59 +103,62 @@ def elasticity_matrix(E, nu, D):
 
 @kernel
 def stiffness(xy, E, nu, thickness, K):
-    """Fill K (6, 6) = A h BᵀDB of one triangle (D1)."""
-    B = np.empty((3, 6))
-    D = np.empty((3, 3))
-    strain_matrix(xy, B)
+    """Fill K (2n, 2n) = ∫ BᵀDB h dA of one triangle (D1)."""
+    B, D, at = np.empty((3, K.shape[0])), np.empty((3, 3)), np.empty(3)
     elasticity_matrix(E, nu, D)
-    weight = area(xy) * thickness
-    for i in range(6):
-        for j in range(6):
-            total = 0.0
+    K[:, :] = 0.0
+    for q in range(len(RULE)):
+        at[0], at[1], at[2] = RULE[q][0], RULE[q][1], RULE[q][2]
+        weight = 0.5 * RULE[q][3] * strain_matrix(xy, at, B) * thickness
+        for i in range(K.shape[0]):
             for p in range(3):
-                for q in range(3):
-                    total += B[p, i] * D[p, q] * B[q, j]
-            K[i, j] = weight * total
+                stress = 0.0
+                for s in range(3):
+                    stress += D[p, s] * B[s, i]
+                for j in range(K.shape[0]):
+                    K[i, j] += weight * stress * B[p, j]
 
 
 @kernel
 def mass(xy, rho, thickness, lumped, m):
-    """Fill m (3, 3), the mass between corners for x as for y: consistent (rho A h/12)(1 + delta_ij) or row-sum lumped (D1)."""
-    total = rho * area(xy) * thickness
-    for i in range(3):
-        for j in range(3):
-            if lumped:
-                m[i, j] = total / 3.0 if i == j else 0.0
-            else:
-                m[i, j] = total / 12.0 * (2.0 if i == j else 1.0)
+    """Fill m (n, n), the mass between nodes for x as for y: consistent, ∫ rho N Nᵀ h dA, or row-sum lumped (D1).
+
+    Row sums leave the corners of six nodes without mass: they are for three.
+    """
+    N, dN, at = np.empty(m.shape[0]), np.empty((m.shape[0], 2)), np.empty(3)
+    m[:, :] = 0.0
+    for q in range(len(RULE)):
+        at[0], at[1], at[2] = RULE[q][0], RULE[q][1], RULE[q][2]
+        shape(at, N)
+        weight = 0.5 * RULE[q][3] * gradients(xy, at, dN) * rho * thickness
+        for i in range(m.shape[0]):
+            for j in range(m.shape[0]):
+                m[i, i if lumped else j] += weight * N[i] * N[j]
 
 
 @kernel
-def stress_matrix(xy, E, nu, S):
-    """Fill S (3, 6): (sigma_xx, sigma_yy, sigma_xy) = S u, tension positive, constant over the triangle."""
-    B = np.empty((3, 6))
-    D = np.empty((3, 3))
-    strain_matrix(xy, B)
+def stress_matrix(xy, E, nu, at, S):
+    """Fill S (4, 2n): (sigma_xx, sigma_yy, sigma_xy, sigma_zz) = S u at a place, tension positive."""
+    B, D = np.empty((3, S.shape[1])), np.empty((3, 3))
+    strain_matrix(xy, at, B)
     elasticity_matrix(E, nu, D)
-    for i in range(3):
-        for j in range(6):
-            total = 0.0
-            for p in range(3):
-                total += D[i, p] * B[p, j]
-            S[i, j] = total
+    for j in range(S.shape[1]):
+        for i in range(3):
+            S[i, j] = D[i, 0] * B[0, j] + D[i, 1] * B[1, j] + D[i, 2] * B[2, j]
+        S[3, j] = nu * (S[0, j] + S[1, j])
 
 
 @kernel
-def all_matrices(nodes, triangles, E, nu, rho, thickness, lumped, K, m):
-    """Element matrices of a whole mesh: K (n, 6, 6), m (n, 3, 3); E, nu, rho (n,) are one value a triangle."""
-    for t in range(triangles.shape[0]):
-        xy = nodes[triangles[t]]
-        stiffness(xy, E[t], nu[t], thickness, K[t])
-        mass(xy, rho[t], thickness, lumped, m[t])
+def all_matrices(solids, lumped, K, m):
+    """Element matrices of all triangles: K (n_triangle, 2n, 2n), m (n_triangle, n, n)."""
+    for t in range(solids.triangles.shape[0]):
+        xy = solids.nodes[solids.triangles[t]]
+        stiffness(xy, solids.E[t], solids.nu[t], solids.thickness, K[t])
+        mass(xy, solids.rho[t], solids.thickness, lumped, m[t])
 
 
 @kernel
-def all_stress_matrices(nodes, triangles, E, nu, S):
-    """Stress matrices S (n, 3, 6) of a whole mesh."""
-    for t in range(triangles.shape[0]):
-        stress_matrix(nodes[triangles[t]], E[t], nu[t], S[t])
+def all_stress_matrices(solids, at, S):
+    """Stress matrices S (n_triangle, 4, 2n) at one place `at` (n_triangle, 3) in each triangle."""
+    for t in range(solids.triangles.shape[0]):
+        stress_matrix(solids.nodes[solids.triangles[t]], solids.E[t], solids.nu[t], at[t], S[t])

@@ -15,9 +15,11 @@ from ..domain_size import is_domain_size
 from ..messages import in_words
 from ..table import axes_of, cases_of
 from .box import deformed_figure, mesh_figure
-from .contact import contact_figure
+from .contact import contact_figure, joint_figure
 from .convergence import convergence_figure
 from .motion import history_figure, record_figure
+from .racking import racking_figure
+from .sections import interaction_figure, sections_figure
 from .style import LABEL_WIDTH, STYLE, in_lines, symbol
 from .sweeps import GRID_QUANTITIES, grid_figure, peaks_figure
 
@@ -39,6 +41,12 @@ def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
         drawings["deformed"] = lambda: deformed_figure(done, shown)
         if marched and ds.sizes["joint"]:
             drawings["contact"] = lambda: contact_figure(done, shown)
+            drawings["joint"] = lambda: joint_figure(done, shown)
+        if ds.sizes["section"]:
+            drawings["sections"] = lambda: sections_figure(done, shown)
+            drawings["interaction"] = lambda: interaction_figure(done, shown)
+        if marched and np.isfinite(done["racking_ratio"]).any():
+            drawings["racking"] = lambda: racking_figure(done, axes)
         if len(axes) > 1 and all(ds[axis].dtype.kind in "fi" for axis in axes):
             for quantity in GRID_QUANTITIES:
                 drawings[f"sweep-{quantity}"] = partial(grid_figure, ds, quantity)

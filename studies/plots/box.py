@@ -25,10 +25,10 @@ def mesh_figure(ds: xr.Dataset) -> Figure:
     ax.add_collection(PolyCollection(list(corners), facecolors=colours, edgecolors="#808080", linewidths=0.3))
     _joint_line(ax, ds, 1.6, "#d95f02")
     _layer_names(ax, corners, layer, structure)
-    for name, x, y in zip(ds["point"].values, ds["point_x"].values, ds["point_y"].values, strict=True):
+    for (x, y), names in _names_by_place(ds).items():
         ax.plot(x, y, "o", color="black", markersize=3.5, clip_on=False)
         label: dict[str, Any] = {"xytext": (4, 4), "textcoords": "offset points", "fontweight": "bold"}
-        ax.annotate(str(name), (x, y), bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}, **label)
+        ax.annotate(", ".join(names), (x, y), bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}, **label)
     ax.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     ax.autoscale_view()
     handles = [Line2D([], [], color="#d95f02", lw=1.6, label="joint"), Line2D([], [], color="#7ea6c4", lw=6, label="structure")]
@@ -36,18 +36,30 @@ def mesh_figure(ds: xr.Dataset) -> Figure:
     return fig
 
 
+def _names_by_place(ds: xr.Dataset) -> dict[tuple[float, float], list[str]]:
+    """Places of the points and their names; several where a point lies on another."""
+    found: dict[tuple[float, float], list[str]] = {}
+    for name, x, y in zip(ds["point"].values, ds["point_x"].values, ds["point_y"].values, strict=True):
+        found.setdefault((round(float(x), 6), round(float(y), 6)), []).append(str(name))
+    return found
+
+
 def _triangles(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Corner coordinates (n, 3, 2) and layer of all triangles."""
+    """Outlines (n, n_node, 2) and layer of all triangles."""
     nodes = np.column_stack([ds["mesh_node_x"], ds["mesh_node_y"]])
     faces, layer = _faces(ds)
     return nodes[faces], layer
 
 
 def _faces(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Corners and layer of the triangles of one case, without the padding that a sweep of meshes brings."""
+    """Nodes round the triangles of one case and their layers, without the triangles that a sweep of meshes pads with.
+
+    Where it pads nodes, the first node closes the outline.
+    """
     faces = ds["mesh_face_nodes"].values.astype(int)
     there = faces[:, 0] >= 0
-    return faces[there], ds["mesh_layer"].values.astype(int)[there]
+    faces = faces[there]
+    return np.where(faces >= 0, faces, faces[:, :1]), ds["mesh_layer"].values.astype(int)[there]
 
 
 def _layer_names(ax: Axes, corners: np.ndarray, layer: np.ndarray, structure: int) -> None:
@@ -115,13 +127,16 @@ def _joint_states(ax: Axes, case: xr.Dataset, moved: np.ndarray) -> None:
     for side in np.unique(case["joint_side"].values):
         on = np.flatnonzero(case["joint_side"].values == side)
         node_arc = np.concatenate([(arc - before)[on], (arc - before + element)[on]])
+        ends = np.concatenate([first[on], last[on]])
+        if corners.shape[1] == 6 and (corners[on, 5] >= 0).all():
+            node_arc, ends = np.append(node_arc, (arc - before + element / 2)[on]), np.append(ends, corners[on, 5])
         order = np.argsort(node_arc)
-        line = moved[np.concatenate([first[on], last[on]])][order]
+        line = moved[ends][order]
         on = on[np.argsort(arc[on])]
         at_nodes = np.isclose(before[on[0]], 0.0) or np.isclose(before[on[0]], element[on[0]])
         inner = (arc[on[:-1]] + arc[on[1:]]) / 2 if at_nodes else (arc - before + element)[on[:-1]]
-        ends = [node_arc.min(), *inner, node_arc.max()]
-        for p, low, high in zip(on, ends[:-1], ends[1:], strict=True):
+        parts = [node_arc.min(), *inner, node_arc.max()]
+        for p, low, high in zip(on, parts[:-1], parts[1:], strict=True):
             if case["shape_state"].values[p] < 0:
                 continue
             span = [low, np.clip(arc[p], low, high), high]

@@ -7,7 +7,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from .style import JOINT_COLOURS, WIDTH, in_lines, joint_handles
+from .style import JOINT_COLOURS, LINES, WIDTH, in_lines, joint_handles
 
 TITLE_WIDTH = 100
 """Characters of a line over the whole figure."""
@@ -34,6 +34,62 @@ def contact_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     panels[-1].set_xlabel("time [s]")
     fig.legend(handles=joint_handles(Patch), loc="outside upper right", ncols=3)
     return fig
+
+
+def joint_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
+    """Round the box the contact pressure (before shaking, and largest), opening and slip; in time what is open and slips."""
+    fig = Figure(figsize=(WIDTH, 5.6))
+    panels = fig.subplots(3, 2, sharex="col", width_ratios=(1.5, 1))
+    for (i, name), (colour, dash) in zip(shown.items(), LINES, strict=False):
+        case = cases.isel(case=i)
+        there = np.flatnonzero(np.isfinite(case["joint_arc"].values))
+        part = case.isel(joint=there[np.argsort(case["joint_arc"].values[there], kind="stable")])
+        style = {"color": colour, "ls": dash}
+        before = 1e-6 * part["joint_pressure"].isel(time=0)
+        panels[0, 0].plot(part["joint_arc"], before, color=colour, ls=dash, lw=0.5, marker=".", markersize=2)
+        panels[0, 0].plot(part["joint_arc"], 1e-6 * part["max_pressure"], **style, label=name)
+        panels[1, 0].plot(part["joint_arc"], 1e3 * part["max_opening"], **style)
+        panels[2, 0].plot(part["joint_arc"], 1e3 * part["max_slip"], **style)
+        for ax, values in zip(
+            panels[:, 1], (case["opened_length"], 1e-3 * case["slip_work"], 100 * case["slip_fraction"]), strict=True
+        ):
+            ax.plot(case["time"], values, lw=0.6, **style)
+    for (left, right), (around, in_time) in zip(panels, _JOINT_LABELS, strict=True):
+        left.set_ylabel(around)
+        right.set_ylabel(in_time)
+    _mark_sides(panels[:, 0], cases.isel(case=0))
+    largest = 1e-6 * float(cases["max_pressure"].isel(case=list(shown)).max())
+    if largest > 0:
+        panels[0, 0].set(yscale="log", ylim=(1e-4 * largest, 2 * largest))
+        panels[0, 0].yaxis.set_major_formatter("{x:g}")
+    panels[-1, 0].set_xlabel("arc length, counter-clockwise from the lower left corner [m]")
+    panels[-1, 1].set_xlabel("time [s]")
+    panels[-1, 1].set_xlim(0, float(cases["time"][-1]))
+    handles, names = panels[0, 0].get_legend_handles_labels()
+    if any(names):
+        fig.legend(handles, names, loc="outside upper center", ncols=len(names), columnspacing=1.0)
+    return fig
+
+
+_JOINT_LABELS = (
+    ("largest pressure [MPa]\n(thin: before shaking)", "open length [m]"),
+    ("largest opening [mm]", "slip work [kJ/m]"),
+    ("largest slip [mm]", "slips [% of length]"),
+)
+
+
+def _mark_sides(panels: np.ndarray, case: xr.Dataset) -> None:
+    """Corners as lines, the names of the sides over the first panel."""
+    case = case.isel(joint=np.flatnonzero(np.isfinite(case["joint_arc"].values)))
+    sides, arc, length = (case[name].values for name in ("joint_side", "joint_arc", "joint_length"))
+    end = 0.0
+    for side in dict.fromkeys(sides[np.argsort(arc, kind="stable")]):
+        start, end = end, end + float(length[sides == side].sum())
+        panels[0].text((start + end) / 2, 1.02, side, transform=panels[0].get_xaxis_transform(), ha="center")
+        for ax in panels:
+            ax.axvline(end, color="0.8", lw=0.6, zorder=0)
+    for ax in panels:
+        ax.set(xlim=(0, end), ylim=(0, None))
 
 
 def _name_sides(ax: Axes, sides: np.ndarray, edges: np.ndarray) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Constraints, JointMaterial, Material, Mesh, MeshError, Spec, System, box_mesh, build_system
-from engine.assembly import joint_points, rows
+from engine.assembly import joint_points, pressure_forces, rows
 from engine.condensed import factorise
 from engine.kernels import triangle
 from engine.model import joint_materials, materials
@@ -28,7 +28,8 @@ def dense(mesh: Mesh, found: list[Material], lumped: bool = False, thickness: fl
     size = 2 * len(mesh.nodes)
     K, M = np.zeros((2, size, size))
     for corners, index in zip(mesh.triangles, mesh.material, strict=True):
-        k, m = np.empty((6, 6)), np.empty((3, 3))
+        n = len(corners)
+        k, m = np.empty((2 * n, 2 * n)), np.empty((n, n))
         triangle.stiffness(mesh.nodes[corners], found[index].E, found[index].nu, thickness, k)
         triangle.mass(mesh.nodes[corners], found[index].rho, thickness, lumped, m)
         dofs = np.array([[2 * c, 2 * c + 1] for c in corners])
@@ -51,11 +52,14 @@ def held_block(block_mesh) -> System:
 # Matrices
 
 
-@pytest.mark.parametrize("options", [{}, {"lumped": True}, {"thickness": 0.3}], ids=str)
-def test_matrices_equal_a_dense_loop_over_the_elements(block_mesh, options):
-    held = Constraints.free(block_mesh).holding(np.array([0, 1]), (0, 1)).holding(np.array([2]), (1,)).tying([3], [5], (0, 1))
-    system = block_system(block_mesh, held, **options)
-    K, M = dense(block_mesh, [GROUND, CONCRETE], **options)
+@pytest.mark.parametrize(
+    ("order", "options"), [(1, {}), (1, {"lumped": True}), (1, {"thickness": 0.3}), (2, {}), (2, {"thickness": 0.3})], ids=str
+)
+def test_matrices_equal_a_dense_loop_over_the_elements(block_mesh, order, options):
+    mesh = block_mesh if order == 1 else block_mesh.quadratic()
+    held = Constraints.free(mesh).holding(np.array([0, 1]), (0, 1)).holding(np.array([2]), (1,)).tying([3], [5], (0, 1))
+    system = block_system(mesh, held, **options)
+    K, M = dense(mesh, [GROUND, CONCRETE], **options)
     T = system.expand.toarray()
     np.testing.assert_allclose(system.K.toarray(), T.T @ K @ T, atol=ROUNDING * abs(K).max() * 10)
     np.testing.assert_allclose(system.M.toarray(), T.T @ M @ T, atol=ROUNDING * abs(M).max() * 10)
@@ -64,20 +68,23 @@ def test_matrices_equal_a_dense_loop_over_the_elements(block_mesh, options):
         assert (matrix.data != 0.0).all()
 
 
-def test_stiffness_is_symmetric_and_positive_with_the_rigid_motions_alone_free(free_block):
+@pytest.mark.parametrize("order", [1, 2])
+def test_stiffness_is_symmetric_and_positive_with_the_rigid_motions_alone_free(block_mesh, order):
     """Two blocks with nothing but joints between them: three rigid motions each."""
-    K = free_block.K.toarray()
+    K = block_system(block_mesh if order == 1 else block_mesh.quadratic()).K.toarray()
     np.testing.assert_allclose(K, K.T, atol=ROUNDING * abs(K).max())
     values = np.linalg.eigvalsh(K)
     assert abs(values[:6]).max() < 1e-12 * values[-1]  # rounding of the largest
     assert values[6] > 1e-6 * values[-1]
 
 
-def test_bonded_stiffness_has_three_rigid_motions_left(free_block):
-    bonded = free_block.bonded_stiffness().toarray()
-    B = free_block.B.toarray()
-    k_n, k_s, _ = free_block.joint_law()
-    expected = free_block.K.toarray() + B.T @ np.diag(np.column_stack([k_n, k_s]).ravel()) @ B
+@pytest.mark.parametrize("order", [1, 2])
+def test_bonded_stiffness_has_three_rigid_motions_left(block_mesh, order):
+    system = block_system(block_mesh if order == 1 else block_mesh.quadratic())
+    bonded = system.bonded_stiffness().toarray()
+    B = system.B.toarray()
+    k_n, k_s, _ = system.joint_law()
+    expected = system.K.toarray() + B.T @ np.diag(np.column_stack([k_n, k_s]).ravel()) @ B
     np.testing.assert_allclose(bonded, expected, atol=ROUNDING * abs(expected).max() * 10)
     values = np.linalg.eigvalsh(bonded)
     assert abs(values[:3]).max() < 1e-12 * values[-1]
@@ -201,6 +208,10 @@ def test_what_does_not_fit_together_is_refused(block_mesh):
         build_system(block_mesh, [GROUND], [JOINT])
     with pytest.raises(MeshError, match="joint_material: names 0, there are 0 joint materials"):
         build_system(block_mesh, [GROUND, CONCRETE])
+    with pytest.raises(MeshError, match="lumped: six-node triangles have no lumped mass"):
+        block_system(block_mesh.quadratic(), lumped=True)
+    with pytest.raises(MeshError, match="quadrature: one point cannot hold a joint of six nodes"):
+        block_system(block_mesh.quadratic(), quadrature="one-point")
 
 
 # Numbering
@@ -327,10 +338,11 @@ def test_gaps_are_structure_minus_ground_in_the_joints_axes(paper_spec, quadratu
     np.testing.assert_allclose(gap, np.column_stack([normal @ relative, tangent @ relative]), atol=1e-14)  # sums of four
 
 
-@pytest.mark.parametrize("quadrature", ["nodal", "one-point"])
-def test_rigid_motion_of_the_whole_makes_no_gap(free_block, block_mesh, quadrature):
-    system = block_system(block_mesh, quadrature=quadrature)
-    rotation = np.column_stack([-block_mesh.nodes[:, 1], block_mesh.nodes[:, 0]])
+@pytest.mark.parametrize(("order", "quadrature"), [(1, "nodal"), (1, "one-point"), (2, "nodal")])
+def test_rigid_motion_of_the_whole_makes_no_gap(block_mesh, order, quadrature):
+    mesh = block_mesh if order == 1 else block_mesh.quadratic()
+    system = block_system(mesh, quadrature=quadrature)
+    rotation = np.column_stack([-mesh.nodes[:, 1], mesh.nodes[:, 0]])
     np.testing.assert_allclose(system.B @ (system.expand.T @ (rotation + 3.0).ravel()), 0.0, atol=1e-14)
 
 
@@ -404,7 +416,7 @@ def test_stresses_of_a_linear_field_are_hookes(free_block, block_mesh):
     """u = (0.01 x, 0.02 y + 0.03 x): plane strain with gamma = 0.03."""
     x, y = block_mesh.nodes.T
     u = free_block.expand.T @ np.column_stack([0.01 * x, 0.02 * y + 0.03 * x]).ravel()
-    stress = (free_block.stress @ u).reshape(-1, 3)
+    stress = (free_block.stress_rows(np.arange(8), np.full((8, 3), 1 / 3)) @ u).reshape(-1, 4)
     for index, material in enumerate((GROUND, CONCRETE)):
         E, nu = material.E, material.nu
         factor = E / ((1 + nu) * (1 - 2 * nu))
@@ -412,8 +424,24 @@ def test_stresses_of_a_linear_field_are_hookes(free_block, block_mesh):
             factor * ((1 - nu) * 0.01 + nu * 0.02),
             factor * ((1 - nu) * 0.02 + nu * 0.01),
             E / (2 * (1 + nu)) * 0.03,
+            factor * nu * (0.01 + 0.02),
         ]
         np.testing.assert_allclose(stress[block_mesh.material == index], [expected] * 4, rtol=1e-13)  # sums of six
+
+
+def test_stresses_are_those_of_the_places_and_triangles_that_are_asked_for(block_mesh):
+    """u_x = x², u_y = 0 in six nodes: sigma_xx = D11 2x, which differs from place to place; a triangle may come twice."""
+    mesh = block_mesh.quadratic()
+    system = block_system(mesh)
+    u = system.expand.T @ np.column_stack([mesh.nodes[:, 0] ** 2, np.zeros(len(mesh.nodes))]).ravel()
+    triangles, places = np.array([5, 0, 5]), np.array([[1.0, 0, 0], [0.2, 0.3, 0.5], [0, 0.5, 0.5]])
+    rows_ = system.stress_rows(triangles, places)
+    assert rows_.shape == (12, system.n_dof)
+    x = np.einsum("ti,ti->t", places, mesh.nodes[mesh.triangles[triangles, :3], 0])
+    E, nu = np.array([(m.E, m.nu) for m in (CONCRETE, GROUND, CONCRETE)]).T
+    factor = E / ((1 + nu) * (1 - 2 * nu)) * 2 * x
+    expected = np.column_stack([factor * (1 - nu), factor * nu, 0 * x, factor * nu])
+    np.testing.assert_allclose((rows_ @ u).reshape(3, 4), expected, atol=1e-13 * abs(expected).max())  # sums of six
 
 
 def test_nodal_values_of_one_lane(held_block):
@@ -433,6 +461,170 @@ def test_rows_are_what_the_kernels_take(held_block):
 
 def test_default_model_counts():
     """The recommended mesh stays near the size that is spoken of."""
-    spec = Spec()
-    mesh = box_mesh(spec).mesh
-    assert 1500 < 2 * len(mesh.nodes) < 2500
+    mesh = box_mesh(Spec()).mesh
+    assert mesh.order == 2
+    assert 3500 < 2 * len(mesh.nodes) < 5500
+
+
+# Joints of six nodes
+
+
+def test_points_of_six_nodes_are_those_of_simpsons_rule(block_mesh):
+    """Two joints of 0.5: shares 1/6, 4/6, 1/6, and one point where they meet."""
+    points = joint_points(block_mesh.quadratic(), "nodal", 0.2)
+    np.testing.assert_allclose(points.length, np.array([1, 4, 2, 4, 1]) / 12, rtol=1e-15)
+    np.testing.assert_allclose(points.area, 0.2 * points.length, rtol=1e-15)
+    assert points.length.sum() == pytest.approx(1.0, rel=1e-15)
+    along = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+    np.testing.assert_array_equal(points.place, np.column_stack([along, np.ones(5)]))
+    np.testing.assert_allclose(points.arc, along, atol=1e-15)
+    np.testing.assert_array_equal(points.normal, [[0.0, 1.0]] * 5)
+    np.testing.assert_array_equal(points.parts, [[0, 0], [0, 1], [0, 2], [1, 2], [1, 3], [1, 4]])
+    np.testing.assert_allclose(points.part_lengths, np.array([1, 4, 1, 1, 4, 1]) / 12, rtol=1e-15)
+
+
+def test_points_of_six_nodes_see_one_node_pair_each(block_mesh):
+    """Minus one on the ground, plus one on the structure over it, nothing elsewhere."""
+    mesh = block_mesh.quadratic()
+    points = joint_points(mesh, "nodal", 1.0)
+    for nodes, shape, place in zip(points.nodes, points.shape, points.place, strict=True):
+        seen = nodes[shape != 0]
+        np.testing.assert_array_equal(np.sort(shape[shape != 0]), [-1.0, 1.0])
+        np.testing.assert_array_equal(mesh.nodes[seen], [place, place])
+        ground, structure = nodes[shape == -1], nodes[shape == 1]
+        assert (mesh.triangles[~mesh.structure] == ground).any()
+        assert (mesh.triangles[mesh.structure] == structure).any()
+
+
+def test_point_of_six_nodes_between_two_materials_is_kept_twice(block_mesh):
+    points = joint_points(replace(block_mesh, joint_material=np.array([0, 1])).quadratic(), "nodal", 1.0)
+    np.testing.assert_allclose(points.length, np.array([1, 4, 1, 1, 4, 1]) / 12, rtol=1e-15)
+    np.testing.assert_array_equal(points.place[:, 0], [0.0, 0.25, 0.5, 0.5, 0.75, 1.0])
+    np.testing.assert_array_equal(points.material, [0, 0, 0, 1, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("change", "doubled"),
+    [({}, 4), ({"layer": through_the_walls()}, 4 + 2), ({"joint": Joint(thickness_ratio=0.1)}, 4 + 8)],
+    ids=["corners", "layers", "lengths"],
+)
+def test_points_of_six_nodes_round_the_box(paper_spec, change, doubled):
+    """As with four nodes, and one more in the middle of each of the twenty joints."""
+    options = paper_spec.mesh.model_copy(update={"order": 2})
+    spec = paper_spec.model_copy(update={"joint": Joint(), "mesh": options, **change})
+    points = joint_points(box_mesh(spec).mesh, "nodal", 1.0)
+    assert len(points) == 20 + doubled + 20
+    np.testing.assert_allclose(np.linalg.norm(points.normal, axis=1), 1.0, rtol=1e-15)
+    for side in ([0, 1], [-1, 0], [0, -1], [1, 0]):
+        on = (abs(points.normal - side) < 1e-12).all(axis=1)
+        assert points.area[on].sum() == pytest.approx(5.0 if side[0] == 0 else 4.0, rel=1e-14)
+
+
+def test_traction_on_six_nodes_has_exact_resultant_and_moment(block_mesh):
+    """A pressure quadratic along the joint: Simpson's rule integrates it and its first moment exactly."""
+    mesh = block_mesh.quadratic()
+    system = block_system(mesh)
+    x = system.points.place[:, 0]
+    force = np.column_stack([system.points.area * (1 + 3 * x - 2 * x**2), 0 * x]).ravel()
+    nodal = system.nodal(system.B.T @ force)
+    structure = np.isin(np.arange(len(mesh.nodes)), mesh.triangles[mesh.structure])
+    for part, sign in ((structure, 1), (~structure, -1)):
+        total, moment = nodal[part, 1].sum(), (mesh.nodes[part, 0] * nodal[part, 1]).sum()
+        assert total == pytest.approx(sign * (1 + 3 / 2 - 2 / 3), rel=1e-14)
+        assert moment == pytest.approx(sign * (1 / 2 + 3 / 3 - 2 / 4), rel=1e-14)
+    assert not nodal[:, 0].any()
+
+
+# Curved joints and edges
+
+
+def on_circles(ends: np.ndarray) -> np.ndarray:
+    """The middle of a side, at the mean of its ends' distances from the origin."""
+    middle = ends.mean(axis=1)
+    return middle * (np.linalg.norm(ends, axis=2).mean(axis=1) / np.linalg.norm(middle, axis=1))[:, None]
+
+
+def half_rings(n: int) -> Mesh:
+    """The half above the x axis of a lining of radius 1 to 2 in ground of radius 2 to 3, in n curved cells, with joints."""
+    turn = np.pi * np.arange(n + 1) / n
+    way = np.column_stack([np.cos(turn), np.sin(turn)])
+    inner, outer = 2 * np.arange(n), 2 * np.arange(n) + 1
+    cells = np.concatenate([np.column_stack([inner, outer, outer + 2]), np.column_stack([inner, outer + 2, inner + 2])])
+    lining, ground = (np.stack([r * way, (r + 1) * way], axis=1).reshape(-1, 2) for r in (1.0, 2.0))
+    there = 2 * (n + 1)
+    outline = [*outer, outer[-1] + 2, *(inner + 2)[::-1], 0]
+    mesh = Mesh(
+        np.concatenate([lining, ground]),
+        np.concatenate([cells, cells + there]),
+        np.repeat([0, 1], 2 * n),
+        joints=np.column_stack([inner + there, inner + 2 + there, outer + 2, outer]),
+        joint_material=np.zeros(n),
+        pressure_edges=np.column_stack([outline, np.roll(outline, -1)]),
+        structure=np.repeat([True, False], 2 * n),
+    )
+    return mesh.quadratic(on_circles)
+
+
+def test_curved_joints_have_the_normals_of_their_parabolas():
+    """Half angle h: at the ends the parabola is inclined by atan(2 tan(h/2)) to its chord, in the middle it is parallel to it."""
+    n = 6
+    h = np.pi / (2 * n)
+    points = joint_points(half_rings(n), "nodal", 1.0)
+    assert len(points) == 3 * n  # neighbours part by h³/2 in direction, so their points stay two
+    place, normal = points.place.reshape(n, 3, 2), points.normal.reshape(n, 3, 2)
+    np.testing.assert_allclose(np.linalg.norm(place, axis=2), 2.0, rtol=1e-15)
+    angle = np.arctan2(*np.moveaxis(-normal, 2, 0)[::-1]).reshape(n, 3)  # of the outward direction: the ground lies outside
+    bend = np.arctan(2 * np.tan(h / 2))
+    np.testing.assert_allclose(angle, h * (2 * np.arange(n)[:, None] + 1) + [[-bend, 0, bend]], atol=1e-14)  # of order one
+
+
+def test_curved_joints_have_the_lengths_of_simpsons_rule():
+    """Speeds 2 |(2 sin h, 4 (1 - cos h))| at the ends and 4 sin h in the middle of a circle of 2: its length to h⁴."""
+    n = 6
+    h = np.pi / (2 * n)
+    points = joint_points(half_rings(n), "nodal", 0.5)
+    ends, middle = 2 * np.hypot(2 * np.sin(h), 4 * (1 - np.cos(h))) / 6, 4 * np.sin(h) * 4 / 6
+    np.testing.assert_allclose(points.length.reshape(n, 3), [[ends, middle, ends]] * n, rtol=1e-14)
+    np.testing.assert_allclose(points.area, 0.5 * points.length, rtol=1e-15)
+    assert points.length.sum() == pytest.approx(2 * np.pi, rel=h**4)
+    assert (np.diff(points.arc.reshape(n, 3)) > 0).all()
+
+
+def test_structure_that_shrinks_opens_curved_joints_along_their_normals():
+    """u = -0.01 r in the lining: gaps of 0.02 along the radius, seen in the axes of each point."""
+    mesh = half_rings(6)
+    system = block_system(mesh)
+    lining = np.isin(np.arange(len(mesh.nodes)), mesh.triangles[mesh.structure])
+    u = -0.01 * mesh.nodes * lining[:, None]
+    gap = (system.B @ (system.expand.T @ u.ravel())).reshape(-1, 2)
+    normal, moved = system.points.normal, -0.01 * system.points.place
+    tangent = np.column_stack([normal[:, 1], -normal[:, 0]])
+    np.testing.assert_allclose(gap[:, 0], (normal * moved).sum(axis=1), atol=1e-15)
+    np.testing.assert_allclose(gap[:, 1], (tangent * moved).sum(axis=1), atol=1e-15)
+    assert (gap[:, 0] > 0.0199).all()
+
+
+def test_pressure_on_six_nodes_has_exact_resultant_and_moment(block_mesh):
+    """p = 2 - x + 3 x² on the top, whose edges run from right to left: quadratic, so exact, with its first moment."""
+    mesh = replace(block_mesh, pressure_edges=np.array([[11, 10], [10, 9]])).quadratic()
+    x = mesh.nodes[:, 0]
+    load = pressure_forces(mesh, 2 - x + 3 * x**2, mesh.pressure_edges, 0.5)
+    assert load[:, 1].sum() == pytest.approx(-0.5 * (2 - 1 / 2 + 1), rel=1e-14)
+    assert (x * load[:, 1]).sum() == pytest.approx(-0.5 * (1 - 1 / 3 + 3 / 4), rel=1e-14)
+    assert abs(load[:, 0]).max() < 1e-15
+    even = pressure_forces(mesh, np.ones(len(x)), mesh.pressure_edges, 1.0)
+    np.testing.assert_allclose(np.sort(even[:, 1])[:5], -np.array([4, 4, 2, 1, 1]) / 12, rtol=1e-14)
+    chosen = pressure_forces(mesh, np.ones(len(x)), mesh.pressure_edges[:1], 1.0)
+    assert chosen[:, 1].sum() == pytest.approx(-0.5, rel=1e-14)
+
+
+def test_pressure_all_round_a_curved_body_has_no_resultant_and_a_gradient_lifts():
+    """On parabolas too: p = p0 - c y lifts c times the area that they enclose, at its centroid (case 10)."""
+    mesh = half_rings(5)
+    x, y = mesh.nodes.T
+    area = mesh.areas()[mesh.structure].sum()
+    even = pressure_forces(mesh, np.full(len(x), 3.0), mesh.pressure_edges, 1.0)
+    np.testing.assert_allclose(even.sum(axis=0), 0.0, atol=1e-14 * 3 * 2 * np.pi)
+    load = pressure_forces(mesh, 7.0 - 2.0 * y, mesh.pressure_edges, 0.5)
+    np.testing.assert_allclose(load.sum(axis=0), [0.0, 0.5 * 2.0 * area], atol=1e-13)  # sums of tens
+    assert (x * load[:, 1] - y * load[:, 0]).sum() == pytest.approx(0.0, abs=1e-12)  # its centroid lies on the y axis

@@ -8,9 +8,11 @@ from engine.carry import _within_over_base
 from engine.column import column_system, free_field
 from engine.spec import Damping, Domain, Layer, MeshOptions, Time
 
+from ..conftest import PLAIN_MESH
+
 DT, N = 0.005, 1200
 T = DT * np.arange(N + 1)
-COARSE = MeshOptions(wall_elements=1, roof_elements=4, side_elements=2)
+COARSE = PLAIN_MESH.model_copy(update={"wall_elements": 1, "roof_elements": 4, "side_elements": 2})
 
 
 def burst(frequency: float) -> np.ndarray:
@@ -20,11 +22,11 @@ def burst(frequency: float) -> np.ndarray:
     return np.column_stack([wave, 0.5 * wave])
 
 
-def layered(depth: float, **time: float) -> Model:
+def layered(depth: float, mesh: MeshOptions = COARSE, **time: float) -> Model:
     """The reference ground on a base at `depth`."""
     spec = Spec(
         domain=Domain(depth=depth),
-        mesh=COARSE,
+        mesh=mesh,
         time=Time(dt=DT, duration=N * DT, **time),
         damping=Damping(reference_depth=14.0),
     )
@@ -46,11 +48,15 @@ def averaged(a: np.ndarray) -> np.ndarray:
     return (a[2:] + 2 * a[1:-1] + a[:-2]) / 4
 
 
-@pytest.mark.parametrize("depth", [17.5, 30.0, 45.0])
+@pytest.mark.parametrize(
+    ("depth", "mesh"),
+    [(17.5, COARSE), (30.0, COARSE), (45.0, COARSE), (30.0, MeshOptions(corner_levels=0))],
+    ids=["17.5", "30", "45", "30, six nodes"],
+)
 @pytest.mark.parametrize("frequency", [2.0, 10.0, 18.4, 25.0])
-def test_the_motion_comes_back_at_its_depth(depth, frequency):
+def test_the_motion_comes_back_at_its_depth(depth, mesh, frequency):
     """At 18.4 Hz the ground above 14 m resonates: the motion at 14 m nearly vanishes there and takes much of the base."""
-    model, motion = layered(depth), burst(frequency)
+    model, motion = layered(depth, mesh), burst(frequency)
     (base,) = carried_down(model, [motion], 14.0)
     back = marched(model, base, 14.0)
     # what the window's spectrum holds under the water level and before t = 0 is below a thousandth of a thousandth
@@ -63,12 +69,19 @@ def test_carrying_to_its_own_depth_changes_nothing():
     np.testing.assert_allclose(base, motion, atol=1e-12)  # transform and back, and a mode sum that must cancel
 
 
-def test_a_uniform_column_has_the_closed_form():
+@pytest.mark.parametrize(
+    ("order", "h", "close"),
+    # linear elements: relative error of k up to (kh)²/24 = 2e-4 at 14 Hz, times kH of 8 and the slopes of resonance, some 4
+    # elements of degree 2: (kh)⁴/1440 = 4e-6 (Ainsworth 2004), times the same
+    [(1, 0.25, 6e-3), (2, 1.0, 1.3e-4)],
+    ids=["three nodes", "six nodes"],
+)
+def test_a_uniform_column_has_the_closed_form(order, h, close):
     """|T| = |cos kz|/|cos kH| with k = w/sqrt(G(1 + i beta w)/rho) where the damping is stiffness proportional."""
     spec = Spec(
         domain=Domain(depth=30.0),
         layer=(Layer(bottom=30.0, G=2e8, nu=0.25, density=2000.0, friction=0.4),),
-        mesh=COARSE.model_copy(update={"first": 0.25, "growth": 1.0, "largest_height": 0.25}),
+        mesh=COARSE.model_copy(update={"order": order, "first": h, "growth": 1.0, "largest_height": h}),
         time=Time(dt=1e-4, duration=1.0),
     )
     model = build_model(spec)
@@ -79,8 +92,7 @@ def test_a_uniform_column_has_the_closed_form():
     got = _within_over_base(stiffness_only, 14.0, np.exp(1j * omega * spec.time.dt))
     speed = np.sqrt(2e8 * (1 + 1j * beta * omega) / 2000.0)
     exact = np.cos(omega / speed * 14.0) / np.cos(omega / speed * 30.0)
-    # linear elements of h = 0.25 m: relative error of k up to (kh)²/24 = 2e-4 at 14 Hz, times kH of 8 and the slopes of resonance
-    np.testing.assert_allclose(got[:, 0], exact, rtol=6e-3)
+    np.testing.assert_allclose(got[:, 0], exact, rtol=close)
 
 
 def test_other_parameters_of_newmark_are_carried_as_they_march():

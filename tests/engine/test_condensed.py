@@ -32,15 +32,6 @@ def test_factor_solves_the_matrix(n_interior):
     np.testing.assert_allclose(x, np.linalg.solve(A.toarray(), b), atol=tolerance)
 
 
-def test_factor_is_ldl_in_the_order_given():
-    A = positive_definite(20, 3)
-    factor = factorise(A, 20)
-    L = sp.csc_array((factor.values, factor.indices, factor.indptr), shape=(20, 20)).toarray()
-    assert not np.triu(L).any()
-    L += np.eye(20)
-    np.testing.assert_allclose(L @ np.diag(factor.pivots) @ L.T, A.toarray(), atol=1e-13)  # sums of twenty of order ten
-
-
 @pytest.mark.parametrize(
     "A",
     [

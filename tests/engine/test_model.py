@@ -98,6 +98,20 @@ def test_pressure_grows_with_depth(paper_model, reference_height):
     assert not load[(y > -4 + 1e-9) | (y < -8 - 1e-9)].any()
 
 
+def test_loads_behind_sections_are_those_of_weight_and_pressure(paper_model):
+    """Weight and pressure by themselves, and nothing without them; (D13) in proportion."""
+    spec = paper_model.spec
+    light = varied(spec, gravity=Gravity(self_weight=False))
+    both = paper_model.behind_sections(spec)
+    pressure = paper_model.behind_sections(light)
+    weight = paper_model.behind_sections(varied(spec, pressure=Pressure(p0=0.0)))
+    assert both.shape == (3 * 20,)
+    np.testing.assert_allclose(both, weight + pressure, atol=1e-14 * abs(both).max())
+    np.testing.assert_array_equal(weight, paper_model.sections.loads(9.81, np.zeros(len(paper_model.system.mesh.nodes))))
+    np.testing.assert_array_equal(paper_model.behind_sections(varied(light, pressure=Pressure(p0=4e6))), 2 * pressure)
+    assert not paper_model.behind_sections(varied(light, pressure=Pressure(p0=0.0))).any()
+
+
 # Building
 
 
@@ -171,7 +185,8 @@ def test_cases_run_and_differ(response, cases):
     assert (response.energy_error <= 1e-9).all()  # (D11)
     np.testing.assert_allclose(response.time, DT * np.arange(0, 201, 2), rtol=1e-14)  # the default keeps every second step
     assert response.recorder.displacement(response.values).shape == (5, 101, 6, 2)
-    assert response.recorder.stress(response.values).shape == (5, 101, 6, 3)
+    assert response.recorder.stress(response.values).shape == (5, 101, 6, 4)
+    assert response.section_forces.shape == (5, 101, 20, 3)  # five sections along each of four members
 
 
 @pytest.mark.parametrize("lane", range(5))
@@ -180,13 +195,14 @@ def test_case_is_marched_with_its_own_loads_and_joints(paper_model, cases, respo
     spec, system = cases[lane], paper_model.system
     weight, pressure = paper_model.weight(spec), paper_model.pressure(spec)
     law = system.joint_law(joint_materials(spec, paper_model.joint_groups))
-    lanes = Lanes.of([weight + pressure], [law], [MOTION])
+    lanes = Lanes.of([weight + pressure], [law], [MOTION], [paper_model.behind_sections(spec)])
     loads = [np.zeros_like(lanes.standing), np.zeros_like(lanes.standing)]
     loads[0][:, 0], loads[1][:, 0] = weight, pressure
     stepper = Stepper(system, newmark_of(spec), paper_model.rayleigh)
     alone = simulate(stepper, lanes, loads, paper_model.frequencies[0], every=spec.output.every)
     np.testing.assert_array_equal(alone.values[0], response.values[lane])
     np.testing.assert_array_equal(alone.joint_peaks[0], response.joint_peaks[lane])
+    np.testing.assert_array_equal(alone.section_forces[0], response.section_forces[lane])
 
 
 def test_motions_of_unequal_length_are_padded(paper_model, paper_spec, response):

@@ -37,6 +37,23 @@ def test_shear_column_has_the_frequencies_of_linear_elements(column):
     np.testing.assert_allclose(natural_frequencies(system, 4), expected, rtol=1e-10)
 
 
+def sheared(mesh: Mesh) -> np.ndarray:
+    """The first four frequencies of a column whose sides move together, and along alone."""
+    held = Constraints.of_sides(mesh, "shear").tying(mesh.boundaries["left"], mesh.boundaries["right"], (0,))
+    return natural_frequencies(build_system(mesh, [GROUND], constraints=held), 4)
+
+
+def test_shear_column_of_six_nodes_converges_with_the_fourth_power():
+    """(case 04) f = (2j - 1) V/(4H) from above: eigenvalues of elements of degree 2 are off by (kh)⁴ (Strang and Fix 1973)."""
+    V = np.sqrt(GROUND.E / (2 * (1 + GROUND.nu)) / GROUND.rho)
+    exact = (2 * np.arange(1, 5) - 1) * V / (4 * 14.0)
+    coarse, fine = (sheared(shear_column(n).quadratic()) / exact - 1 for n in (14, 28))
+    assert (fine > 0).all()
+    assert (fine < sheared(shear_column(28)) / exact - 1).all()
+    # the next power, (kh)², is a tenth at most in the third mode of the coarse column
+    np.testing.assert_allclose(np.log2(coarse / fine)[1:3], 4.0, atol=0.1)
+
+
 def test_bonded_frequencies_equal_a_dense_solver(paper_model):
     system = paper_model.system
     values = eigh(system.bonded_stiffness().toarray(), system.M.toarray(), eigvals_only=True)
@@ -49,16 +66,19 @@ def test_frequencies_are_sorted_and_the_same_every_time(paper_model):
     assert (np.diff(first) > 0).all()
 
 
-def test_joints_count_as_closed_and_sticking(block_mesh):
+@pytest.mark.parametrize("order", [1, 2])
+def test_joints_count_as_closed_and_sticking(block_mesh, order):
     """Two blocks on joints that are soft against them: sqrt(k/m) of springs in a row, at k of the joint alone."""
-    held = Constraints.free(block_mesh).holding(block_mesh.boundaries["base"], (0, 1))
+    mesh = block_mesh if order == 1 else block_mesh.quadratic()
+    held = Constraints.free(mesh).holding(mesh.boundaries["base"], (0, 1))
     k_n, k_s = 1e-3, 2e-4
     stiff = [Material(1e3, 0.2, 1.0), Material(1e3, 0.2, 1.0)]
-    system = build_system(block_mesh, stiff, [JointMaterial(k_n, k_s, 0.0)], held)
+    system = build_system(mesh, stiff, [JointMaterial(k_n, k_s, 0.0)], held)
     frequencies = natural_frequencies(system, 3)
     # The block of mass 1 slides and rocks on k_s and k_n, coupled by its height; it bounces on k_n alone.
     rocking = 1 / 6 + 0.25  # about the middle of its foot: (1 + 1)/12 + 1/4
-    k_rocking = k_n * (2 * 0.25 * 0.25)
+    # shares 1/4, 1/2, 1/4 or Simpson's 1/12, 4/12, 2/12, 4/12, 1/12 at their distances from the middle
+    k_rocking = k_n * (2 * 0.25 * 0.5**2 if order == 1 else 2 * (0.5**2 / 12 + 4 / 12 * 0.25**2))
     M = np.array([[1.0, -0.5], [-0.5, rocking]])
     coupled = eigh(np.diag([k_s, k_rocking]), M, eigvals_only=True)
     expected = np.sort(np.sqrt([*coupled, k_n])) / (2 * np.pi)

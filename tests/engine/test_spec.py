@@ -7,7 +7,21 @@ import pytest
 from pydantic import ValidationError
 
 from engine import PRESETS, Spec
-from engine.spec import Box, Damping, Domain, Gravity, Layer, MeshOptions, Motion, Output, Pressure, Section, Supports, Time
+from engine.spec import (
+    Box,
+    Damping,
+    Domain,
+    Gravity,
+    Joint,
+    Layer,
+    MeshOptions,
+    Motion,
+    Output,
+    Pressure,
+    Section,
+    Supports,
+    Time,
+)
 
 FILE = {"from_file": True}
 
@@ -36,7 +50,9 @@ def test_defaults_are_the_reference_problem():
     assert spec.supports.sides == "tied"
     assert spec.gravity == Gravity(self_weight=True, acceleration=9.81)
     assert spec.mesh.mass == "consistent"
-    assert spec.mesh.wall_elements >= 2  # one triangle through a wall is four to eight times too stiff
+    assert spec.mesh.order == 2  # one triangle of three nodes through a wall is four to eight times too stiff
+    assert (spec.mesh.wall_elements, spec.mesh.corner_levels) == (1, 4)
+    assert spec.output.sections == 5
     assert spec.output.points == {}
     assert Spec.model_validate(PRESETS["coral-2010"], context=FILE) == spec
 
@@ -241,6 +257,24 @@ def test_layer_needs_exactly_one_stiffness_and_one_density(given, message):
         layer(**given)
 
 
+@pytest.mark.parametrize(
+    ("table", "field", "value"),
+    [
+        ("mesh", "order", 0),
+        ("mesh", "order", 3),
+        ("mesh", "order", 1.5),
+        ("mesh", "corner_levels", -1),
+        ("mesh", "corner_levels", 9),
+        ("mesh", "corner_growth", 1.0),
+        ("mesh", "corner_growth", 4.1),
+        ("output", "sections", 1),
+        ("output", "sections", 101),
+    ],
+)
+def test_mesh_and_sections_keep_within_their_limits(table, field, value):
+    assert f"{table}.{field}" in refused({table: {field: value}})
+
+
 def test_ground_needs_a_layer():
     assert "at least 1 item" in refused({"layer": []})
 
@@ -275,6 +309,12 @@ def soft(*bottoms: float) -> tuple[Layer, ...]:
             },
             'supports.sides = "shear": is for horizontal motion only',
         ),
+        (
+            {"mesh": MeshOptions(mass="lumped")},
+            'mesh.mass = "lumped": six-node triangles (mesh.order = 2) have no sound lumped mass',
+        ),
+        ({"joint": Joint(quadrature="one-point")}, 'joint.quadrature = "one-point": cannot hold a joint of six nodes'),
+        ({"output": Output(sections=4)}, "output.sections = 4: must be odd, to have ends and a middle"),
         ({"output": Output(points={"A": (9.0, -1.0)})}, "output.points.A: is a name the model has already"),
         ({"output": Output(points={"P": (10.1, -1.0)})}, "output.points.P = [10.1 m, -1 m]: must lie in the ground"),
         ({"output": Output(points={"P": (0.0, 0.1)})}, "must lie in the ground or in the box's walls"),
@@ -304,6 +344,8 @@ def test_all_rules_between_fields_are_reported_at_once():
         {"supports": Supports(sides="shear"), "gravity": Gravity(self_weight=False)},
         {"output": Output(points={"P": (2.25, -6.0), "Q": (0.0, -4.25), "R": (10.0, -14.0), "T": (-10.0, 0.0)})},
         {"mesh": MeshOptions(wall_elements=1, roof_elements=2, side_elements=2, first=3, growth=1)},
+        {"mesh": MeshOptions(order=1, mass="lumped"), "joint": Joint(quadrature="one-point")},
+        {"mesh": MeshOptions(corner_levels=0), "output": Output(sections=3)},
         {"layer": soft(100.0)},
     ],
 )

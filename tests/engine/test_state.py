@@ -31,11 +31,11 @@ def test_rest_is_zero_and_of_the_shapes_the_kernels_take(system):
     state = State.at_rest(system)
     n, m = system.n_dof, len(system.points)
     assert {x.shape for x in state.motion} == {(n, LANES)}
-    assert [x.shape for x in state.contact] == [(LANES, 2 * m)] * 3 + [(LANES, m)] * 2
+    assert [x.shape for x in state.contact] == [(LANES, 2 * m)] * 3 + [(LANES, m)] * 3
     assert state.contact.state.dtype == np.int8
     assert state.energy.shape == (8, LANES)
     assert not any(x.any() for x, _ in all_arrays(state))
-    assert len({id(x) for x, _ in all_arrays(state)}) == 15  # no array stands for two
+    assert len({id(x) for x, _ in all_arrays(state)}) == 16  # no array stands for two
 
 
 def test_copy_is_independent(state):

@@ -13,6 +13,8 @@ COARSE = """
 record = "ridgecrest-2019-clc-360.AT2"
 peak = "1.7085 m/s**2"
 [mesh]
+order = 1
+corner_levels = 0
 wall_elements = 1
 roof_elements = 4
 side_elements = 2

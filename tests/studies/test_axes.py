@@ -8,9 +8,9 @@ import xarray as xr
 
 from engine import Spec
 from studies import run_study, write_dataset
-from studies.axes import TAKEN
-from studies.dataset import COORDINATES, SCHEMA
+from studies.axes import OF_THE_RESULTS, TAKEN
 from studies.fields import catalogue, resolve
+from studies.schema import COORDINATES, SCHEMA
 
 from .conftest import COARSE, study_of
 
@@ -38,8 +38,11 @@ WITHOUT_DEFAULT = {
     "joint.thickness_ratio": 0.1,
 }
 
-NOT_SWEPT = ("motion.record_dt",)
-"""A record has one time step (test_plan)."""
+NOT_SWEPT = ("motion.record_dt", "output.sections")
+"""A record has one time step (test_plan), and all cases of a dataset the same sections (malformed)."""
+
+ALL_VALUES = {"mesh.order": (1, 2)}
+"""Of fields that have no more."""
 
 
 def value_in(spec, name):
@@ -53,6 +56,8 @@ def value_in(spec, name):
 def swept(name):
     """A field with the number of a layer, and two values of it in SI."""
     name = name.replace(".N.", f".{LAYER_OF.get(name.rpartition('.')[2], 1)}.")
+    if name in ALL_VALUES:
+        return name, ALL_VALUES[name]
     given = value_in(study_of(BASE).cases[0], name)
     value = WITHOUT_DEFAULT.get(name, given)
     if isinstance(value, int):
@@ -95,6 +100,15 @@ def test_every_number_can_be_swept_by_a_range(field):
         assert all(isinstance(value, int) is whole for value in found)
 
 
+@pytest.mark.parametrize("name", OF_THE_RESULTS)
+def test_what_decides_the_results_is_a_field_that_each_study_sets(name):
+    assert name in NOT_SWEPT
+    assert {field.name for field in catalogue()} > set(OF_THE_RESULTS)
+    for sections in (3, 9):
+        (case,) = study_of(BASE + f"[output]\nsections = {sections}\n").cases
+        assert value_in(case, name) == sections
+
+
 def test_no_axis_has_the_name_of_a_variable():
     """Short names and names with underscores alike; the dataset would lose what the axis is called."""
     taken = set(SCHEMA) | set(COORDINATES) | {dim for variable in SCHEMA.values() for dim in variable.dims}
@@ -125,6 +139,9 @@ SWEEPS = {
     "mesh_largest_height": (BRIEF, 'mesh.largest_height = ["3 m", "2 m"]'),
     "roof_elements": (BRIEF, "roof_elements = [4, 6]"),
     "wall_elements": (BRIEF, "wall_elements = [2, 1]"),
+    "mesh_order": (BRIEF, "mesh.order = [1, 2]"),
+    "corner_levels": (BRIEF, "corner_levels = [1, 0]"),
+    "wall": (BRIEF, 'wall = ["0.5 m", "0.8 m"]'),
     "dt": (BRIEF, 'dt = ["5 ms", "10 ms"]'),
     "duration": (BRIEF, 'duration = ["0.1 s", "0.2 s"]'),
     "every": (BRIEF, "every = [1, 2, 4]"),
@@ -199,7 +216,7 @@ def test_every_case_is_that_of_a_study_of_its_own(run):
                 theirs, mine, late = theirs[at], mine[: len(at)], mine[len(at) :]
                 assert (np.isnan(late) | (late == -1)).all()
             kept = tuple(slice(n) for n in theirs.shape)
-            scale = np.nanmax(np.abs(theirs), initial=0.0)
+            scale = np.abs(theirs[np.isfinite(theirs)]).max(initial=0.0)
             # a batch of lanes and a lane alone: the same operations, summed in another order at most
             np.testing.assert_allclose(mine[kept], theirs, rtol=1e-7, atol=1e-9 * scale, err_msg=name)
             outside = np.ones(mine.shape, dtype=bool)

@@ -129,9 +129,11 @@ def test_out_names_the_file(quick_toml, folder):
 
 
 def test_plot_draws_beside_the_results(quick_toml, folder):
+    """Those of a study that keeps one time: the others are those of test_plots."""
+    quick_toml.write_text(QUICK.replace("[sweep]", "[output]\nevery = 1000\n[sweep]"))
     outcome = call("run", quick_toml, "--plot", "--workers", 1)
     assert outcome.exit_code == 0
-    figures = [f"results/quick-{name}.png" for name in ("contact", "deformed", "history", "mesh", "peaks", "record")]
+    figures = [f"results/quick-{name}.png" for name in ("deformed", "interaction", "mesh", "peaks", "sections")]
     assert files(folder) == sorted(["quick.toml", "results/quick.nc", *figures])
     for figure in figures:
         assert f"figure {figure}" in flat(outcome.stdout)
@@ -346,9 +348,21 @@ def test_check_says_what_would_run_and_runs_nothing(quick_toml, folder, monkeypa
     assert any(line.startswith("cases ") and "4 in 1 batch" in line and "160 case-steps" in line for line in lines)
     assert any(line.startswith("mesh ") and "32 structure + 20 joint + 132 ground elements" in line for line in lines)
     warnings = [line.removeprefix("warning: ") for line in lines if line.startswith("warning: ")]
+    assert any(
+        line.startswith("bending ") and line.endswith("three-node triangles: walls at most 13.1 times too stiff")
+        for line in lines
+    )
     starts = ("time.dt = 0.01 s ", "the walls may be ", "the net uplift ", "pressure.p0 = 4 MPa bends ")
     assert len(warnings) == len(starts)
     assert all(warning.startswith(start) for warning, start in zip(warnings, starts, strict=True))
+
+
+def test_check_of_the_default_mesh(folder):
+    """Six-node triangles: right in bending, nothing to warn of."""
+    (folder / "plain.toml").write_text('[pressure]\np0 = 0\n[time]\nduration = "1 s"\n')
+    lines = call("check", "plain.toml").stdout.splitlines()
+    assert any(line.startswith("bending ") and "six-node triangles: right where a wall bends" in line for line in lines)
+    assert not [line for line in lines if line.startswith("warning: ")]
 
 
 def test_check_takes_a_shipped_name(folder):
@@ -359,16 +373,19 @@ def test_check_takes_a_shipped_name(folder):
 
 
 def test_table_prints_one_row_a_case(results, quick_ds):
-    """The swept field as the dataset has it, lengths in mm, stresses in MPa, three digits."""
+    """The swept field as the dataset has it, lengths in mm, stresses in MPa, three digits; sections by their names."""
     outcome = call("table", results)
     assert outcome.exit_code == 0
     lines = outcome.stdout.splitlines()
     head = flat(" ".join(lines[:-4]))
     assert (head.count("[mm]"), head.count("[MPa]"), head.count("[Pa]")) == (4, 1, 1)
-    factors = [1, 1, 1, 1e3, 1e3, 1, 1e3, 1e3, 1e-6, 1]
+    assert (head.count("[Nm/m]"), head.count("[N/m]")) == (1, 1)
+    factors = [1, 1, 1, 1e3, 1e3, 1, 1e3, 1e3, 1, 1, 1e-6, 1]
     for line, (_, expected) in zip(lines[-4:], table(quick_ds).iterrows(), strict=True):
-        shown = [float(word) for word in line.split()]
-        assert shown == pytest.approx([f * v for f, v in zip(factors, expected, strict=True)], rel=5e-3)
+        section = expected.pop("section")
+        assert line.count(f"  {section}  ") == 1
+        shown = [float(word) for word in line.replace(section, "").split()]
+        assert shown == pytest.approx([f * v for f, v in zip(factors, expected, strict=True)], rel=5e-3)  # three digits
 
 
 def test_table_with_several_swept_fields_is_not_cut(folder):
@@ -377,7 +394,7 @@ def test_table_with_several_swept_fields_is_not_cut(folder):
     write_dataset(run_study(study_of(SHORT + sweep), workers=1), folder / "x.nc")
     outcome = call("table", "x.nc")
     assert "…" not in outcome.stdout
-    assert len(outcome.stdout.splitlines()[-1].split()) == 14
+    assert len(re.split(r"\s{2,}", outcome.stdout.splitlines()[-1].strip())) == 17
 
 
 def test_swept_lengths_are_shown_in_metres(folder):
@@ -589,8 +606,8 @@ def test_table_on_a_narrow_terminal(narrow):
     folder, environment = narrow
     answer = shell(folder, "table", "results/quick.nc", **environment)
     assert (answer.returncode, answer.stderr) == (0, b"")
-    row = answer.stdout.decode("ascii").splitlines()[-1].split()
-    assert len(row) == 10
+    row = re.split(r"\s{2,}", answer.stdout.decode("ascii").splitlines()[-1].strip())
+    assert len(row) == 13
     assert [float(word) for word in row[:2]] == [4e6, 0.0]
 
 

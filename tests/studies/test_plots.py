@@ -2,12 +2,14 @@
 
 import re
 from itertools import combinations
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import same_color, to_hex, to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Text
 
@@ -15,17 +17,22 @@ from studies import run_study, write_dataset
 from studies.domain_size import SOURCE_SIZE, SOURCE_TOLERANCE, series_of
 from studies.plots import _shown, draw_all
 from studies.plots.box import deformed_figure, mesh_figure
-from studies.plots.contact import contact_figure
+from studies.plots.contact import contact_figure, joint_figure
 from studies.plots.convergence import convergence_figure
 from studies.plots.motion import history_figure, record_figure
+from studies.plots.racking import NU, SCATTER, published, racking_figure
+from studies.plots.sections import FORCES, MEMBERS, interaction_figure, sections_figure
 from studies.plots.style import JOINT_COLOURS, JOINT_STATES, LINES, MANY_LINES, STYLE, WIDTH, in_lines
 from studies.plots.sweeps import GRID_QUANTITIES, grid_figure, peaks_figure
 from studies.table import axes_of, cases_of
 
-from .conftest import COARSE, SHORT, study_of
+from .conftest import COARSE, FAILING, SHORT, study_of
 
-NAMES = ("mesh", "record", "history", "deformed", "contact")
+STILL = ("mesh", "record", "history", "deformed", "contact", "joint", "sections", "interaction")
 """Figures of every study in which a case came to its end."""
+
+NAMES = (*STILL, "racking")
+"""And of every study that shakes the ground."""
 
 GRID = tuple(f"sweep-{quantity}" for quantity in GRID_QUANTITIES)
 
@@ -98,6 +105,10 @@ def figures(quick_ds, both, sizes):
         "history": lambda: history_figure(cases, SHOWN),
         "deformed": lambda: deformed_figure(cases, SHOWN),
         "contact": lambda: contact_figure(cases, SHOWN),
+        "joint": lambda: joint_figure(cases, SHOWN),
+        "sections": lambda: sections_figure(cases, SHOWN),
+        "interaction": lambda: interaction_figure(cases, SHOWN),
+        "racking": lambda: racking_figure(cases, ["p0"]),
         "peaks": lambda: peaks_figure(cases, "p0"),
         "grid of two": lambda: grid_figure(grid_of(names[:2]), "racking"),
         "grid of three": lambda: grid_figure(grid_of(names[:3]), "opening"),
@@ -115,6 +126,27 @@ def drawn(quick_ds, tmp_path_factory):
     """Files of the quick study by the figure's name."""
     folder = tmp_path_factory.mktemp("figures")
     return {path.stem.removeprefix("quick-"): path for path in draw_all(quick_ds, folder / "quick.nc")}
+
+
+AT_STAKE = ("joint", "sections", "interaction", "racking", "convergence")
+"""Figures whose texts depend on the numbers of a study; to lay out takes longer than to draw."""
+
+
+def figures_of(ds):
+    """Every figure that the dataset allows, by its name, drawn; those at stake are laid out as they are saved."""
+    found = {}
+
+    def lay_out(figure, file):
+        name = Path(file).stem.removeprefix("x-")
+        if name not in AT_STAKE:
+            figure.set_layout_engine("none")
+        figure.draw_without_rendering()
+        found[name] = figure
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", lay_out)
+        draw_all(ds, Path("x.nc"))
+    return found
 
 
 def texts_of(figure):
@@ -180,9 +212,14 @@ def test_drawing_leaves_the_style_of_others_alone(failing_ds, tmp_path):
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_text_is_seven_points_or_more(name, figures):
-    assert figures[name].get_figwidth() == WIDTH == 180 / 25.4
-    assert figures[name].get_figheight() < 250 / 25.4  # a page
-    sizes = [text.get_fontsize() for text in texts_of(figures[name])]
+    check_size(figures[name])
+
+
+def check_size(figure):
+    """180 mm wide, no higher than a page, letters of seven points and more."""
+    assert figure.get_figwidth() == WIDTH == 180 / 25.4
+    assert figure.get_figheight() < 250 / 25.4  # a page
+    sizes = [text.get_fontsize() for text in texts_of(figure)]
     assert len(sizes) > 3
     assert min(sizes) >= 7
 
@@ -206,14 +243,18 @@ def test_text_stays_on_the_page_and_lies_on_no_other(name, figures):
     check_texts(figures[name])
 
 
+RATIOS = ("racking ratio R", "flexibility ratio F")
+"""Of like quantities: they have no unit."""
+
+
 @pytest.mark.parametrize("name", FIGURES)
 def test_axes_have_labels_with_units(name, figures):
     figure = figures[name]
     labels = [label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())]
     labels += [text.get_text().split("\n")[0] for text in (figure._supxlabel, figure._supylabel) if text is not None]
-    labels = [label for label in labels if label]
-    assert all(re.search(r"\[.+\]$", label) for label in labels), labels
-    assert len(labels) > 1
+    labels = [label for label in labels if label and label not in RATIOS]
+    assert all(re.search(r"\[.+\]( ?\n?\(.+\))?$", label) for label in labels), labels  # behind it what its sign means
+    assert len(labels) > (name != "racking")  # whose other labels are ratios
 
 
 def test_the_legend_of_the_modes_lies_on_no_spectrum(both):
@@ -234,7 +275,7 @@ def test_lines_are_told_apart_in_grey():
 
 def check_side_by_side(cases, shown):
     """The figures that tell cases apart by their labels, lines of their legends too."""
-    for figure in (deformed_figure, history_figure, contact_figure):
+    for figure in (deformed_figure, history_figure, contact_figure, joint_figure, sections_figure, interaction_figure):
         laid = laid_out(lambda figure=figure: figure(cases, shown))
         check_texts(laid)
         for legend in laid.legends:
@@ -358,7 +399,8 @@ def test_the_mesh_names_its_points_and_layers(figures):
 def mixed():
     """Deformed boxes of joints of another number of points, and of other boxes: the figure and its cases."""
     found = []
-    for sweep in ('quadrature = ["one-point", "nodal"]', 'box_width = ["5 m", "6 m"]', 'domain_width = ["30 m", "15 m"]'):
+    sweeps = ('quadrature = ["one-point", "nodal"]', 'box_width = ["5 m", "6 m"]', 'domain_width = ["30 m", "15 m"]')
+    for sweep in (*sweeps, "mesh.order = [2, 1]"):
         cases = cases_of(run_study(study_of(f'{SHORT}[pressure]\np0 = "0.283 MPa"\n[sweep]\n{sweep}\n'), workers=1))
         with mpl.rc_context(STYLE):
             figure = deformed_figure(cases, {0: "first", 1: "second"})
@@ -373,7 +415,9 @@ def test_joint_colours_are_the_states(quick_ds, figures):
         check_colours(ax, cases.isel(case=case))
 
 
-@pytest.mark.parametrize("i", range(6), ids=["one-point", "nodal", "5 m", "6 m", "30 m", "15 m"])
+@pytest.mark.parametrize(
+    "i", range(8), ids=["one-point", "nodal", "5 m", "6 m", "30 m", "15 m", "six nodes", "three nodes beside six"]
+)
 def test_joint_colours_are_the_states_on_every_mesh_of_a_sweep(i, mixed):
     check_colours(*mixed[i])
 
@@ -384,15 +428,19 @@ def check_colours(ax, case):
     nodes = np.column_stack([case["mesh_node_x"], case["mesh_node_y"]])
     layer, faces, u = case["mesh_layer"].values, case["mesh_face_nodes"].values.astype(int), case["shape"].values
     box = np.unique(faces[layer == layer.max()])
+    box = box[box >= 0]
     moved = nodes + factor * (u - np.median(u[box], axis=0))
     there = np.isfinite(case["max_pressure"].values)
     states = [JOINT_STATES[int(state)] for state in case["shape_state"].values[there]]
     assert sorted(str(line.get_color()) for line in ax.lines) == sorted(JOINT_COLOURS[state] for state in states)
     assert len(set(states)) > 1  # the test tells colours apart
     places = np.column_stack([case["joint_x"], case["joint_y"]])[there]
-    for place, (_, _, last, first), state in zip(places, case["joint_nodes"].values[there].astype(int), states, strict=True):
+    for place, joint, state in zip(places, case["joint_nodes"].values[there].astype(int), states, strict=True):
+        last, first, *middle = joint[[2, 3, *range(5, len(joint))]]
         along = np.linalg.norm(place - nodes[first]) / np.linalg.norm(nodes[last] - nodes[first])
         target = moved[first] + along * (moved[last] - moved[first])
+        if middle and middle[0] >= 0 and np.isclose(along, 0.5):
+            target = moved[middle[0]]
         lines = [line for line in ax.lines if np.abs(line.get_xydata() - target).sum(axis=1).min() < 1e-9]  # [m]
         assert any(same_color(line.get_color(), JOINT_COLOURS[state]) for line in lines)
 
@@ -720,54 +768,335 @@ def test_a_failed_size_is_a_gap_in_the_convergence(sizes):
     check_texts(laid_out(lambda: convergence_figure(lost)))  # nothing but the tolerance is left
 
 
-# other studies ---------------------------------------------------------------------------------------------------------------
+# the joint round the box -----------------------------------------------------------------------------------------------------
+
+
+def in_order(case):
+    """The joint points of a case by their arc length."""
+    case = case.isel(joint=np.flatnonzero(np.isfinite(case["joint_arc"].values)))
+    return case.isel(joint=np.argsort(case["joint_arc"].values, kind="stable"))
+
+
+def check_joint(figure, cases, shown):
+    """Round the box pressure, opening and slip of every case shown, in time what is open, the work and what slips."""
+    panels = np.reshape(figure.axes, (3, 2))
+    for k, i in enumerate(shown):
+        case = in_order(cases.isel(case=i))
+        around = (
+            (panels[0, 0].lines[2 * k], 1e-6 * case["joint_pressure"].isel(time=0)),
+            (panels[0, 0].lines[2 * k + 1], 1e-6 * case["max_pressure"]),
+            (panels[1, 0].lines[k], 1e3 * case["max_opening"]),
+            (panels[2, 0].lines[k], 1e3 * case["max_slip"]),
+        )
+        for line, values in around:
+            np.testing.assert_array_equal(line.get_xdata(), case["joint_arc"])
+            np.testing.assert_array_equal(line.get_ydata(), values)
+        in_time = (case["opened_length"], 1e-3 * case["slip_work"], 100 * case["slip_fraction"])
+        for ax, values in zip(panels[:, 1], in_time, strict=True):
+            np.testing.assert_array_equal(ax.lines[k].get_xdata(), cases["time"])
+            np.testing.assert_array_equal(ax.lines[k].get_ydata(), values)
+
+
+def test_the_joint_is_that_of_the_cases_shown(quick_ds, figures):
+    check_joint(figures["joint"], cases_of(quick_ds), SHOWN)
+    assert [text.get_text() for text in figures["joint"].legends[0].get_texts()] == list(SHOWN.values())
+
+
+@pytest.mark.parametrize("sweep", ["mesh.order = [1, 2]", 'duration = ["0.2 s", "0.4 s"]'], ids=["orders", "ends that differ"])
+def test_the_joint_of_a_sweep_is_that_of_each_case(sweep):
+    cases = cases_of(run_study(study_of(f"{SHORT}[sweep]\n{sweep}\n"), workers=1))
+    figure = joint_figure(cases, {0: "first", 1: "second"})
+    check_joint(figure, cases, [0, 1])
+    assert figure.axes[1].get_xlim()[1] == figure.axes[5].get_xlim()[1] == pytest.approx(0.4, abs=1e-12)
+
+
+def test_sides_are_named_above_their_part_of_the_arc(figures):
+    """Of a box 5 m x 4 m: floor to 5 m, right wall to 9 m, roof to 14 m, left wall to 18 m; lines at the corners."""
+    panels = np.reshape(figures["joint"].axes, (3, 2))
+    found = {text.get_text(): text.get_position()[0] for text in panels[0, 0].texts}
+    assert found == pytest.approx({"floor": 2.5, "right wall": 7, "roof": 11.5, "left wall": 16}, rel=1e-14)
+    for ax in panels[:, 0]:
+        assert ax.get_xlim() == pytest.approx((0, 18), rel=1e-14)
+        corners = [line.get_xdata()[0] for line in ax.lines if len(line.get_xdata()) == 2]
+        assert corners == pytest.approx([5, 9, 14, 18], rel=1e-14)
+
+
+def test_pressures_are_shown_over_four_decades(quick_ds, figures):
+    """The largest of the cases shown lies within; what bears nothing has no place on a logarithmic axis."""
+    ax = figures["joint"].axes[0]
+    low, high = ax.get_ylim()
+    assert ax.get_yscale() == "log"
+    largest = 1e-6 * float(quick_ds["max_pressure"].isel(p0=list(SHOWN)).max())
+    assert (low, high) == pytest.approx((1e-4 * largest, 2 * largest), rel=1e-14)
+
+
+def test_a_joint_that_bears_nothing_has_a_linear_pressure(quick_ds):
+    cases = cases_of(quick_ds).copy(deep=True)
+    for name in ("max_pressure", "joint_pressure"):
+        cases[name].values[:] = 0
+    figure = laid_out(lambda: joint_figure(cases, SHOWN))
+    assert figure.axes[0].get_yscale() == "linear"
+    check_texts(figure)
+
+
+def test_the_joint_of_one_case_needs_no_legend():
+    cases = cases_of(run_study(study_of(SHORT), workers=1))
+    figure = joint_figure(cases, _shown(cases, []))
+    check_joint(figure, cases, [0])
+    assert not figure.legends
+
+
+def test_cases_round_the_joint_differ_in_dash(figures):
+    panels = np.reshape(figures["joint"].axes, (3, 2))
+    for ax in panels[1:, 0]:
+        assert len({line.get_linestyle() for line in ax.lines[: len(SHOWN)]}) == len(SHOWN)
+
+
+def test_histories_of_the_joint_are_told_apart_in_grey(quick_ds):
+    """By their dash, or by a fifth of the way from black to white as the states of the joint are."""
+    figure = joint_figure(cases_of(quick_ds), {0: "first", 2: "middle", 3: "last"})
+    for ax in np.reshape(figure.axes, (3, 2))[:, 1]:
+        dashes = {line.get_linestyle() for line in ax.lines}
+        steps = np.diff(sorted(lightness(line.get_color()) for line in ax.lines))
+        assert len(dashes) == 3 or min(steps) >= 0.2
+
+
+# sections --------------------------------------------------------------------------------------------------------------------
+
+
+def on_members(case, names):
+    """Sections of some members of a case, by their position."""
+    on = np.flatnonzero(np.isin(case["section_member"].values, names))
+    return case.isel(section=on[np.argsort(case["section_position"].values[on], kind="stable")])
+
+
+def check_sections(figure, cases, shown):
+    """Of every force along every member: a line before the shaking, a band from the least to the largest, a line at zero."""
+    panels = np.reshape(figure.axes, (3, 4))
+    for (row, column), ax in np.ndenumerate(panels):
+        name, letter = list(FORCES.items())[row]
+        lines, bands = ax.lines[:-1], ax.collections
+        assert len(lines) == len(bands) == len(shown)
+        assert set(ax.lines[-1].get_ydata()) == {0}
+        for i, line, band in zip(shown, lines, bands, strict=True):
+            part = on_members(cases.isel(case=i), [MEMBERS[column]])
+            np.testing.assert_array_equal(line.get_xdata(), part["section_position"])
+            np.testing.assert_array_equal(line.get_ydata(), 1e-3 * part[name].isel(time=0))
+            corners = {tuple(corner) for corner in band.get_paths()[0].vertices}
+            for end in ("min", "max"):
+                values = 1e-3 * part[f"extreme_{name}"].sel(extreme=f"{end} {letter}").values
+                assert set(zip(part["section_position"].values, values, strict=True)) <= corners
+
+
+def test_sections_are_those_of_the_cases_shown(quick_ds, figures):
+    figure = figures["sections"]
+    check_sections(figure, cases_of(quick_ds), SHOWN)
+    assert [ax.get_title() for ax in figure.axes[:4]] == list(MEMBERS) == ["roof", "floor", "left wall", "right wall"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(SHOWN.values())
 
 
 @pytest.mark.parametrize(
-    ("sweep", "names"),
-    [
-        ("", NAMES),
-        ("[sweep]\nscale = [-1, 0, 1]\n", (*NAMES, "peaks")),
-        ('[sweep]\ndomain_width = ["15 m", "20 m", "30 m"]\n', (*NAMES, "peaks")),
-        ('[sweep]\ndt = ["10 ms", "5 ms"]\nbox_width = ["6 m", "5 m"]\n', (*NAMES, *GRID)),
-        ('[sweep]\nquadrature = ["one-point", "nodal"]\nduration = ["0.2 s", "0.4 s"]\n', NAMES),
-        ("[output]\nevery = 1000\n", ("mesh", "deformed")),
-        ('[output]\nevery = 30\n[sweep]\nduration = ["0.2 s", "0.4 s"]\n', NAMES),
-        ('[domain_size]\nwidth = { from = "12.8 m", num = 3 }\n', (*NAMES, "convergence")),
-    ],
-    ids=[
-        "one case",
-        "negative",
-        "domains",
-        "steps and boxes",
-        "words, ends that differ",
-        "one time kept",
-        "one time of the first case kept",
-        "domain size",
-    ],
+    "text",
+    ["[output]\nsections = 9\n", '[sweep]\nwall = ["0.3 m", "0.8 m"]\n', "[sweep]\nmesh.order = [1, 2]\n"],
+    ids=["nine", "walls", "orders"],
 )
-def test_figures_of_other_studies_as_read_from_their_files(sweep, names, tmp_path):
-    write_dataset(run_study(study_of(SHORT + sweep), workers=1), tmp_path / "x.nc")
-    ds = xr.load_dataset(tmp_path / "x.nc", engine="netcdf4")
-    files = draw_all(ds, tmp_path / "x.nc")
-    assert tuple(path.stem.removeprefix("x-") for path in files) == names
-    assert all(path.stat().st_size > 5000 for path in files)
+def test_sections_of_other_studies_are_those_of_each_case(text):
+    cases = cases_of(run_study(study_of(SHORT + text), workers=1))
+    shown = {i: f"case {i}" for i in range(cases.sizes["case"])}
+    check_sections(sections_figure(cases, shown), cases, shown)
+    check_interaction(interaction_figure(cases, shown), cases, shown)
 
 
-def test_figures_without_pressure_weight_and_motion(tmp_path):
-    """A box on which nothing acts does not move: no division by its largest displacement."""
-    text = COARSE.replace('record = "ridgecrest-2019-clc-360.AT2"', 'record = "none"')
-    text += '[time]\ndt = "0.01 s"\nduration = "0.1 s"\n[gravity]\nself_weight = false\n[pressure]\np0 = 0\n'
-    ds = run_study(study_of(text), workers=1)
-    assert not ds["displacement"].any()
-    assert [path.stem for path in draw_all(ds, tmp_path / "x.nc")] == [f"x-{name}" for name in NAMES]
+def test_sections_of_one_case_say_what_the_line_is():
+    cases = cases_of(run_study(study_of(SHORT), workers=1))
+    shown = _shown(cases, [])
+    for figure, word in ((sections_figure, "before the shaking"), (interaction_figure, "extremes")):
+        (legend,) = figure(cases, shown).legends
+        assert [text.get_text() for text in legend.get_texts()] == [word]
 
 
-def test_failed_cases_are_not_drawn(failing_ds, tmp_path):
-    files = draw_all(failing_ds, tmp_path / "x.nc")
-    assert [path.stem for path in files] == [f"x-{name}" for name in NAMES]
+def test_cases_along_the_members_differ_in_dash(figures):
+    for ax in figures["sections"].axes:
+        assert len({line.get_linestyle() for line in ax.lines[:-1]}) == len(SHOWN)
+
+
+def check_interaction(figure, cases, shown):
+    """M and N of every section and time as dots, at the extremes of both as marks, in a panel for roof, walls and floor."""
+    groups = {"roof": ["roof"], "walls": ["left wall", "right wall"], "floor": ["floor"]}
+    assert [ax.get_title() for ax in figure.axes] == list(groups)
+    for ax, names in zip(figure.axes, groups.values(), strict=True):
+        assert len(ax.lines) == 2 * len(shown) + 2  # and the lines of no moment and of no force
+        for k, i in enumerate(shown):
+            part = on_members(cases.isel(case=i), names)
+            dots, marks = ax.lines[2 * k : 2 * k + 2]
+            pairs = np.column_stack([1e-3 * part[name].values.ravel() for name in ("bending_moment", "axial_force")])
+            np.testing.assert_array_equal(dots.get_xydata(), pairs)
+            part = part.sel(extreme=["max N", "min N", "max M", "min M"])
+            pairs = np.column_stack([1e-3 * part[f"extreme_{n}"].values.ravel() for n in ("bending_moment", "axial_force")])
+            np.testing.assert_array_equal(marks.get_xydata(), pairs)
+
+
+def test_pairs_of_moment_and_force_are_those_of_the_cases_shown(quick_ds, figures):
+    check_interaction(figures["interaction"], cases_of(quick_ds), SHOWN)
+    assert [text.get_text() for text in figures["interaction"].legends[0].get_texts()] == list(SHOWN.values())
+
+
+def test_pairs_of_cases_differ_in_their_marks(figures):
+    for ax in figures["interaction"].axes:
+        assert len({line.get_marker() for line in ax.lines[1 : 2 * len(SHOWN) : 2]}) == len(SHOWN)
+
+
+# racking ---------------------------------------------------------------------------------------------------------------------
+
+
+def test_published_curves_take_their_known_values():
+    """As stiff as the ground (F = 1) the box racks as the free field; a rigid one not at all; a hole 4 (1 - nu) times as much."""
+    at_one = published(np.array([1.0]), 0.3)
+    assert at_one["NCHRP 611"][0] == 1
+    assert at_one["Penzien 2000, no slip"][0] == pytest.approx(1, rel=1e-15)
+    assert at_one["Penzien 2000, full slip"][0] == pytest.approx(4 * 0.7 / (3.5 - 3 * 0.3), rel=1e-15)
+    for name, curve in published(np.array([0.0, 1e12]), 0.3).items():
+        limit = 2 if name == "NCHRP 611" else 4 * 0.7
+        assert curve == pytest.approx([0, limit], rel=1e-11, abs=0)  # 1/F from its limit
+
+
+def test_every_case_stands_on_the_published_curves(quick_ds, figures):
+    ax = figures["racking"].axes[0]
+    *curves, points = ax.lines
+    np.testing.assert_array_equal(points.get_xdata(), quick_ds["flexibility_ratio"])
+    np.testing.assert_array_equal(points.get_ydata(), quick_ds["racking_ratio"])
+    assert NU == 0.25
+    for line, (name, curve) in zip(curves, published(curves[0].get_xdata(), NU).items(), strict=True):
+        assert line.get_label() == name
+        np.testing.assert_array_equal(line.get_ydata(), curve)
+    assert len({line.get_linestyle() for line in curves}) == 3
+    low, high = ax.get_xlim()
+    assert low <= float(quick_ds["flexibility_ratio"].min()) <= float(quick_ds["flexibility_ratio"].max()) <= high
+    assert ax.get_ylim()[1] >= float(quick_ds["racking_ratio"].max())
+
+
+def test_the_scatter_is_that_of_its_label(figures):
+    ax = figures["racking"].axes[0]
+    (legend,) = figures["racking"].legends
+    assert f"± {100 * SCATTER:.0f} %" in [text.get_text() for text in legend.get_texts()]
+    (band,) = ax.collections
+    nchrp = ax.lines[0].get_ydata()
+    corners = band.get_paths()[0].vertices[:, 1]
+    assert (corners.min(), corners.max()) == pytest.approx((0.8 * nchrp.min(), 1.2 * nchrp.max()), rel=1e-14)
+
+
+def test_the_ratio_is_shown_along_the_only_axis(quick_ds, figures):
+    (line,) = figures["racking"].axes[1].lines
+    np.testing.assert_allclose(line.get_xdata(), 1e-6 * quick_ds["p0"], rtol=1e-14)
+    np.testing.assert_array_equal(line.get_ydata(), quick_ds["racking_ratio"])
+    assert figures["racking"].axes[1].get_xlabel() == "$p_0$ [MPa]"
+
+
+@pytest.mark.parametrize("text", ["", '[sweep]\nsides = ["tied", "roller", "fixed"]\n', '[sweep]\np0 = [0, "1 MPa"]\n'])
+def test_without_such_an_axis_the_box_is_shown_against_the_free_field(text):
+    """Of the first case, less the static part, in mm."""
+    ds = run_study(study_of(SHORT + text), workers=1)
+    cases = cases_of(ds)
+    (line,) = racking_figure(cases, axes_of(ds)).axes[1].lines
+    shear = cases["racking_shear"].isel(case=0)
+    np.testing.assert_array_equal(line.get_xdata(), 1e3 * cases["racking_free_field"].isel(case=0))
+    np.testing.assert_array_equal(line.get_ydata(), 1e3 * (shear - shear.isel(time=0)))
+
+
+@pytest.mark.parametrize("highest", [1.0, 2.5, 5.0])
+def test_the_legend_of_the_published_curves_lies_on_none_and_on_no_point(highest, quick_ds):
+    cases = cases_of(quick_ds).copy(deep=True)
+    cases["racking_ratio"].values[:] = highest * np.array([0.7, 0.8, 0.9, 1.0])
+    figure = laid_out(lambda: racking_figure(cases, ["p0"]))
+    legends = [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]
+    for box in (legend.get_window_extent() for legend in legends):
+        for line in figure.axes[0].lines:
+            assert not any(box.contains(x, y) for x, y in line.get_transform().transform(line.get_xydata()))
+
+
+# other studies ---------------------------------------------------------------------------------------------------------------
+
+WITHOUT_MOTION = COARSE.replace('record = "ridgecrest-2019-clc-360.AT2"', 'record = "none"')
+WITHOUT_MOTION += '[time]\ndt = "0.01 s"\nduration = "0.1 s"\n'
+
+OTHERS = {
+    "the default mesh, nine sections": ('[time]\ndt = "0.01 s"\nduration = "0.2 s"\n[output]\nsections = 9\n', NAMES),
+    "negative factors": (SHORT + "[sweep]\nscale = [-1, 0, 1]\n", (*NAMES, "peaks")),
+    "negative pressure, steps and walls": (
+        SHORT + '[pressure]\np0 = "-2 MPa"\n[sweep]\ndt = ["10 ms", "5 ms"]\nwall = ["0.3 m", "0.8 m"]\n',
+        (*NAMES, *GRID),
+    ),
+    "words, the first case at rest, ends that differ": (
+        SHORT + '[sweep]\nrecord = ["none", "ridgecrest-2019-clc-360.AT2"]\nquadrature = ["one-point", "nodal"]\n'
+        'duration = ["0.2 s", "0.4 s"]\n',
+        NAMES,
+    ),
+    "one time kept": (SHORT + "[output]\nevery = 1000\n", ("mesh", "deformed", "sections", "interaction")),
+    "one time of the first case kept": (SHORT + '[output]\nevery = 30\n[sweep]\nduration = ["0.2 s", "0.4 s"]\n', NAMES),
+    "domain size": (SHORT + '[domain_size]\nwidth = { from = "12.8 m", num = 3 }\n', (*NAMES, "convergence")),
+    "no motion, the first case without loads": (
+        WITHOUT_MOTION + '[gravity]\nself_weight = false\n[sweep]\np0 = [0, "1 MPa", "4 MPa"]\n',
+        (*STILL, "peaks"),
+    ),
+    "failed cases": (FAILING, NAMES),
+}
+"""Studies of other kinds, and the figures of each."""
+
+
+@pytest.fixture(scope="module", params=OTHERS)
+def other(request, tmp_path_factory):
+    """The name of a study of another kind, and its figures, drawn as its file gives it back."""
+    path = tmp_path_factory.mktemp("other") / "x.nc"
+    write_dataset(run_study(study_of(OTHERS[request.param][0]), workers=1), path)
+    ds = xr.load_dataset(path, engine="netcdf4")
+    return request.param, figures_of(ds)
+
+
+def test_figures_of_other_studies_are_drawn_and_legible(other):
+    """180 mm wide, letters of seven points, on the page and none on another, wherever the values lie."""
+    name, found = other
+    assert tuple(found) == OTHERS[name][1]
+    for of, figure in found.items():
+        check_size(figure)
+        if of not in AT_STAKE:
+            continue
+        check_texts(figure)
+        for legend in figure.legends:
+            box = legend.get_window_extent()
+            assert box.x0 >= 0, of
+            assert box.x1 <= figure.get_figwidth() * figure.dpi, of
+
+
+def test_the_points_of_a_flush_box_are_told_apart(failing_ds):
+    check_texts(laid_out(lambda: mesh_figure(cases_of(failing_ds).isel(case=0))))
+
+
+def test_small_rackings_of_the_free_field_have_labels_apart():
+    """Hundredths of a millimetre have long labels."""
+    text = SHORT + '[box]\nwidth = "12 m"\nheight = "3 m"\n'
+    check_texts(laid_out(lambda: racking_figure(cases_of(run_study(study_of(text), workers=1)), [])))
+
+
+def test_a_box_on_which_nothing_acts_is_drawn():
+    """No division by its largest displacement."""
+    text = "[gravity]\nself_weight = false\n[pressure]\np0 = 0\n"
+    cases = cases_of(run_study(study_of(WITHOUT_MOTION + text), workers=1))
+    assert not cases["displacement"].any()
+    assert not cases["bending_moment"].any()
+    for figure in (deformed_figure, sections_figure, joint_figure):
+        check_texts(laid_out(lambda figure=figure: figure(cases, {0: ""})))
+
+
+@pytest.mark.parametrize(("dimension", "left_out"), [("section", {"sections", "interaction"}), ("joint", {"contact", "joint"})])
+def test_without_joint_or_sections_their_figures_are_left_out(dimension, left_out, monkeypatch):
+    """A dataset of one case may hold less than a study gives."""
+    bare = run_study(study_of(SHORT), workers=1).isel({dimension: slice(0, 0)})
+    monkeypatch.setattr(Figure, "savefig", lambda *arguments: None)
+    drawn = [path.stem.removeprefix("x-") for path in draw_all(bare, Path("x.nc"))]
+    assert set(NAMES) - set(drawn) == left_out
 
 
 def test_of_a_study_that_failed_throughout_the_mesh_is_drawn(failing_ds, tmp_path):
     (path,) = draw_all(failing_ds.isel(p0=[1]), tmp_path / "x.nc")
     assert path.name == "x-mesh.png"
+    assert path.stat().st_size > 5000

@@ -8,8 +8,8 @@ import xarray as xr
 
 from engine import Status, Trace, build_model
 from studies import run_study, write_dataset
-from studies.dataset import COORDINATES, SCHEMA
 from studies.run import trace_case
+from studies.schema import COORDINATES, SCHEMA
 from studies.show import TRACE_HEAD, show_lines, trace_line
 
 from .conftest import SHORT, study_of
@@ -63,6 +63,32 @@ def test_every_variable_is_listed_with_dimensions_unit_and_meaning(kind, kinds):
         assert (f" [{unit}] " in rest) == (unit not in ("", "1"))
         assert f" {attrs['long_name']}" in rest
         assert attrs.get("comment", "") in rest
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_that_describes_itself_is_listed_once(kind, kinds):
+    """And nothing else: between the two gaps there is one line for each variable and coordinate."""
+    ds, lines = kinds[kind]
+    first, second = (i for i, line in enumerate(lines[: lines.index("study file")]) if not line)
+    listed = [line.split(" ")[0] for line in lines[first + 1 : second]]
+    described = [name for name, variable in ds.variables.items() if "long_name" in variable.attrs]
+    assert sorted(listed) == sorted(described)
+    assert {*SCHEMA, *COORDINATES, "mesh", "mesh_face_nodes", "mesh_layer", "joint_nodes"} <= set(listed)
+
+
+def test_forces_and_works_are_told_with_units_and_signs(kinds):
+    lines = kinds["sweep"][1]
+    for name, told in {
+        "axial_force": "(p0, time, section) [N m-1] axial force N of the sections; tension positive, a metre of the third "
+        "dimension",
+        "extreme_bending_moment": "(p0, section, extreme) [N m m-1] bending moment M at the moment of each extreme",
+        "extreme_time": "(p0, section, extreme) [s] moment of each extreme of the section forces",
+        "slip_work": "(p0, time) [J m-1] work dissipated by slip since the static state; a metre of the third dimension",
+        "flexibility_ratio": "(p0) flexibility ratio F of the box; its shear strain by itself over the ground's, both under one "
+        "shear stress",
+        "section_member": "(section) member of the box: floor, right wall, roof, left wall",
+    }.items():
+        assert told_of(lines, name, below=True) == told
 
 
 @pytest.mark.parametrize("kind", KINDS)

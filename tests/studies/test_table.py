@@ -1,7 +1,8 @@
-"""The table and the three sentences say what the dataset holds, for one case and for many."""
+"""The table and the four sentences say what the dataset holds, for one case and for many."""
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from engine import Status
 from studies import run_study, sentences, table
@@ -26,6 +27,14 @@ def grid_ds():
 def one(ds, i):
     """The study of one case, its axis kept."""
     return ds.isel(p0=[i])
+
+
+def worst(ds, i):
+    """Section and extreme at which the bending moment of a case is largest in magnitude, found one by one."""
+    case = cases_of(ds).isel(case=i)
+    places = [(s, e) for s in range(case.sizes["section"]) for e in range(case.sizes["extreme"])]
+    section, extreme = max(places, key=lambda place: abs(float(case["extreme_bending_moment"][place])))
+    return case.isel(section=section, extreme=extreme)
 
 
 def lift(ds, lifted):
@@ -64,11 +73,14 @@ def test_cases_keep_their_order(grid_ds):
         ("closed before [1]", lambda ds: ds["closed_before_shaking"]),
         ("u_x at A [m]", lambda ds: ds["peak_displacement"].sel(point="A", component="x")),
         ("racking [m]", lambda ds: ds["peak_racking"]),
-        ("racking ratio [1]", lambda ds: ds["peak_racking"] / ds["peak_racking_free_field"]),
+        ("racking ratio [1]", lambda ds: ds["racking_ratio"]),
         ("opening [m]", lambda ds: ds["max_opening"].max("joint")),
         ("slip [m]", lambda ds: ds["max_slip"].max("joint")),
         ("stress xx at C [Pa]", lambda ds: ds["peak_stress"].sel(point="C", stress_component="xx")),
         ("energy error [1]", lambda ds: ds["energy_error"]),
+        ("moment [Nm/m]", lambda ds: xr.DataArray([worst(ds, i)["extreme_bending_moment"] for i in range(4)])),
+        ("N then [N/m]", lambda ds: xr.DataArray([worst(ds, i)["extreme_axial_force"] for i in range(4)])),
+        ("section", lambda ds: xr.DataArray([str(worst(ds, i)["section"].values) for i in range(4)])),
     ],
 )
 def test_columns_are_the_datasets_values(column, value, quick_ds):
@@ -76,18 +88,75 @@ def test_columns_are_the_datasets_values(column, value, quick_ds):
 
 
 def test_every_number_of_the_table_names_its_unit(quick_ds):
-    assert [name for name in table(quick_ds).columns if not name.endswith("]")] == ["status"]
+    assert [name for name in table(quick_ds).columns if not name.endswith("]")] == ["status", "section"]
+
+
+def test_columns_stand_in_one_order(quick_ds, failing_ds):
+    """The axes first, then how the case ended."""
+    expected = [
+        "p0 [Pa]",
+        "status",
+        "closed before [1]",
+        "u_x at A [m]",
+        "racking [m]",
+        "racking ratio [1]",
+        "opening [m]",
+        "slip [m]",
+        "moment [Nm/m]",
+        "section",
+        "N then [N/m]",
+        "stress xx at C [Pa]",
+        "energy error [1]",
+    ]
+    assert list(table(quick_ds).columns) == expected
+    assert list(table(failing_ds).columns) == expected
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_moment_is_the_largest_in_magnitude(sign, ds):
+    """Of either sign, with the axial force of its own moment, not the largest one."""
+    at = {"p0": 1, "section": 7, "extreme": 4 if sign > 0 else 5}
+    ds["extreme_bending_moment"][at] = sign * 1e9
+    ds["extreme_axial_force"][at] = -123.0
+    row = table(ds).iloc[1]
+    assert (row["moment [Nm/m]"], row["section"], row["N then [N/m]"]) == (sign * 1e9, "right wall middle", -123.0)
+    others = table(ds).drop(index=1)
+    assert (others["moment [Nm/m]"].abs() < 1e9).all()
+
+
+def test_the_axial_force_beside_the_moment_is_of_that_moment():
+    """Against the histories, which keep every step."""
+    ds = run_study(study_of(SHORT + "[output]\nevery = 1\n"), workers=1)
+    moment = ds["bending_moment"]
+    step, section = np.unravel_index(int(np.abs(moment.values).argmax()), moment.shape)
+    (row,) = table(ds).to_dict("records")
+    assert row["section"] == ds["section"].values[section]
+    # histories are in single precision
+    assert row["moment [Nm/m]"] == pytest.approx(float(moment[step, section]), rel=1e-7)
+    assert row["N then [N/m]"] == pytest.approx(float(ds["axial_force"][step, section]), rel=1e-7)
+
+
+def test_without_sections_there_is_no_moment():
+    """A dataset that holds none has nothing to tell of them."""
+    ds = run_study(study_of(SHORT), workers=1)
+    bare = ds.isel(section=slice(0, 0))
+    (row,) = table(bare).to_dict("records")
+    assert np.isnan([row["moment [Nm/m]"], row["N then [N/m]"]]).all()
+    assert row["section"] == ""
+    assert sentences(bare) == sentences(ds)[:3]
 
 
 def test_racking_ratio_without_a_free_field_is_not_a_number(ds):
-    ds["peak_racking_free_field"].values[1] = 0.0
+    ds["racking_ratio"].values[1] = np.nan
     assert np.isnan(table(ds)["racking ratio [1]"][1])
 
 
 def test_a_failed_case_has_its_row(failing_ds):
     frame = table(failing_ds)
     assert frame["status"].tolist() == [0, 4]
-    assert np.isnan(frame["racking [m]"][1])
+    for name in ("racking [m]", "racking ratio [1]", "moment [Nm/m]", "N then [N/m]"):
+        assert np.isnan(frame[name]).tolist() == [False, True]
+    assert frame["section"].tolist() == [str(worst(failing_ds, 0)["section"].values), ""]
 
 
 # words ---------------------------------------------------------------------------------------------------------------------
@@ -128,10 +197,10 @@ def test_truth_values_are_written_as_in_a_study_file(value):
 # sentences -----------------------------------------------------------------------------------------------------------------
 
 
-def test_three_sentences(quick_ds, grid_ds):
+def test_four_sentences(quick_ds, grid_ds):
     for ds in (quick_ds, grid_ds):
         found = sentences(ds)
-        assert len(found) == 3
+        assert len(found) == 4
         assert all(sentence[0].isupper() and sentence.endswith(".") for sentence in found)
 
 
@@ -198,20 +267,55 @@ def test_no_slip_at_all(ds):
 
 
 def test_racking_is_told_at_its_extremes(quick_ds):
-    ratio = (quick_ds["peak_racking"] / quick_ds["peak_racking_free_field"]).values
+    ratio = quick_ds["racking_ratio"].values
     assert (ratio.argmin(), ratio.argmax()) == (0, 3)
-    expected = f"Peak racking is {ratio[0]:.2g} × the free field's at p0 = 0 and {ratio[3]:.2g} × at p0 = 4 MPa."
+    expected = f"The box racks {ratio[0]:.2g} × as much as the free field at p0 = 0 and {ratio[3]:.2g} × at p0 = 4 MPa."
     assert sentences(quick_ds)[2] == expected
 
 
 def test_without_a_free_field_there_is_no_racking_to_compare(ds):
-    ds["peak_racking_free_field"].values[:] = 0.0
+    ds["racking_ratio"].values[:] = np.nan
     assert sentences(ds)[2] == "There is no horizontal motion that would rack the free field."
 
 
 def test_a_single_ratio_is_told_once(ds):
-    ds["peak_racking_free_field"].values[1:] = 0.0
-    assert sentences(ds)[2].count("×") == 1
+    ds["racking_ratio"].values[1:] = np.nan
+    ratio = float(ds["racking_ratio"][0])
+    assert sentences(ds)[2] == f"The box racks {ratio:.2g} × as much as the free field at p0 = 0."
+
+
+def told_of(case, place=""):
+    """The sentence about the largest bending moment of a case; forces in kN."""
+    found = worst(case, 0)
+    moment, axial = (in_words(1e-3 * float(found[f"extreme_{name}"]), "") for name in ("bending_moment", "axial_force"))
+    section, time = str(found["section"].values), float(found["extreme_time"])
+    return f"The largest bending moment is {moment} kNm/m ({section}, {time:.2f} s, N = {axial} kN/m){place}."
+
+
+def test_the_largest_bending_moment_is_told_with_section_time_axial_force_and_case(quick_ds):
+    largest = [abs(float(worst(quick_ds, i)["extreme_bending_moment"])) for i in range(4)]
+    assert np.argmax(largest) == 3
+    assert sentences(quick_ds)[3] == told_of(one(quick_ds, 3), " at p0 = 4 MPa")
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_moment_of_either_sign_may_be_the_largest(sign, ds):
+    at = {"p0": 2, "section": 12, "extreme": 4 if sign > 0 else 5}
+    for name, value in {"bending_moment": sign * 1.234e9, "axial_force": -5.67e5}.items():
+        ds[f"extreme_{name}"][at] = value
+    ds["extreme_time"][at] = 0.12
+    moment = "1.23e+06" if sign > 0 else "-1.23e+06"
+    assert sentences(ds)[3] == (
+        f"The largest bending moment is {moment} kNm/m (roof middle, 0.12 s, N = -567 kN/m) at p0 = 0.283 MPa."
+    )
+
+
+def test_the_largest_moment_of_a_failed_case_is_not_told(ds):
+    """It holds none; nor does its place among the cases shift that of the others."""
+    ds["status"].values[3] = Status.NOT_CONVERGED
+    for name in ("extreme_bending_moment", "extreme_axial_force", "extreme_time"):
+        ds[name].values[3] = np.nan
+    assert sentences(ds)[3].endswith(" at p0 = 0.283 MPa.")
 
 
 def test_one_case_is_told_without_its_place(quick_ds):
@@ -219,11 +323,12 @@ def test_one_case_is_told_without_its_place(quick_ds):
     closed = 100 * float(case["closed_before_shaking"][0])
     times = case["first_slip"].values[0]
     side = case["joint_side"].values[int(np.nanargmin(times))]
-    ratio = float(case["peak_racking"][0] / case["peak_racking_free_field"][0])
+    ratio = float(case["racking_ratio"][0])
     assert sentences(case) == [
         f"Before shaking {closed:.0f} % of the joint is closed and the floor has lifted.",
         f"It first slips at {np.nanmin(times):.2f} s on the {side}.",
-        f"Peak racking is {ratio:.2g} × the free field's.",
+        f"The box racks {ratio:.2g} × as much as the free field.",
+        told_of(case),
     ]
 
 
@@ -241,6 +346,8 @@ def test_one_case_whose_floor_bears(quick_ds):
         ("side_elements", ("2", "4")),
         ("domain_width", ('"15 m"', '"20 m"')),
         ("box_width", ('"5 m"', '"6 m"')),
+        ("wall", ('"0.3 m"', '"0.5 m"')),
+        ("mesh.order", ("1", "2")),
     ],
 )
 @pytest.mark.parametrize("p0", ["0 Pa", "4 MPa"])
@@ -249,7 +356,8 @@ def test_sentences_on_meshes_that_differ_are_those_of_each_mesh_alone(axis, valu
     text = f'{SHORT.replace("side_elements = 2", "")}[pressure]\np0 = "{p0}"\n[sweep]\n{axis} = '
     both = run_study(study_of(f"{text}[{', '.join(values)}]"), workers=1)
     alone = [run_study(study_of(f"{text}[{value}]"), workers=1) for value in values]
-    before, first, racking = sentences(both)
+    axis = axis.replace(".", "_")
+    before, first, racking, bending = sentences(both)
     lifted = [sentences(ds)[0].endswith("has lifted.") for ds in alone]
     assert before.endswith("the floor has lifted in every case." if p0 == "4 MPa" else "the floor bears in every case.")
     assert set(lifted) == {p0 == "4 MPa"}
@@ -259,8 +367,10 @@ def test_sentences_on_meshes_that_differ_are_those_of_each_mesh_alone(axis, valu
     assert first.startswith(f"The first slip comes at {times[soonest]:.2f} s on the {side} at {axis} = ")
     assert first.endswith("2 of 2 cases slip.")
     for ds in alone:
-        ratio = float(ds["peak_racking"][0] / ds["peak_racking_free_field"][0])
-        assert f"{ratio:.2g} ×" in racking
+        assert f"{float(ds['racking_ratio'][0]):.2g} ×" in racking
+    largest = max(alone, key=lambda ds: abs(float(worst(ds, 0)["extreme_bending_moment"])))
+    place = f" at {axis} = {in_words(largest[axis].values[0], largest[axis].attrs['units'])}"
+    assert bending == told_of(largest, place)
 
 
 # failures ------------------------------------------------------------------------------------------------------------------

@@ -69,7 +69,10 @@ def test_table_prints_every_number_whole(say, quick_ds, width):
     printed = say(width, "table", "results/kurz ü.nc")
     assert printed == say(WIDTHS[-1], "table", "results/kurz ü.nc")
     rows = printed.splitlines()[-len(table(quick_ds)) :]
-    assert all(len([float(word) for word in row.split()]) == len(table(quick_ds).columns) for row in rows)
+    for row, section in zip(rows, table(quick_ds)["section"], strict=True):
+        cells = re.split(r"\s{2,}", row.strip())
+        assert cells.pop(9) == section
+        assert len([float(cell) for cell in cells]) == len(table(quick_ds).columns) - 1
 
 
 @pytest.mark.parametrize("width", WIDTHS)

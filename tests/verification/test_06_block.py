@@ -1,7 +1,8 @@
 """Case 06: a block that slides, bounces, tips and is pulled, on a unilateral Coulomb joint. Units N, cm, s.
 
 A block whose nodes all move together is a point mass, so the closed forms and the event-driven integrations hold for it without
-any error of discretisation in space. All lanes of one march share the block; they differ in pressure, joint and motion.
+any error of discretisation in space, with joints of four nodes as with joints of six. All lanes of one march share the block;
+they differ in pressure, joint and motion.
 """
 
 import json
@@ -26,8 +27,9 @@ from engine import (
     equilibrium,
     natural_frequencies,
 )
-from engine.kernels.joint import OPEN
+from engine.kernels.joint import OPEN, STICK
 from engine.kernels.march import INPUT, JOINT, JOINT_ELASTIC, KINETIC
+from tests.verification.orders import BOTH_ORDERS, of_order
 
 CASE = json.loads(Path(__file__).with_name("case_06.json").read_text())
 GRAVITY = 981.0
@@ -40,27 +42,33 @@ RHO = MASS / WIDTH**2
 SOFT = Material(1.0, 0.25, RHO)  # its stiffness plays no part where all nodes are tied
 
 
-def block_mesh(spring=False):
-    """A square block on two nodes of the base; with `spring`, a second square on top of it."""
+def block_mesh(order, spring=False):
+    """A square block on two nodes of the ground; with `spring`, a second square on top of it. The ground comes last."""
     nodes = [(x, y) for y in ((0, 0, 100, 200) if spring else (0, 0, 100)) for x in (0, 100)]
     squares = (2, 4) if spring else (2,)
     triangles = [corner for sw in squares for corner in ((sw, sw + 1, sw + 3), (sw, sw + 3, sw + 2))]
-    return Mesh(
-        nodes=np.array(nodes, dtype=float),
-        triangles=np.array(triangles),
-        material=np.repeat(np.arange(len(squares)), 2),
+    mesh = Mesh(
+        nodes=np.array([*nodes, (50, -100)], dtype=float),
+        triangles=np.array([*triangles, (0, len(nodes), 1)]),
+        material=np.array([*np.repeat(np.arange(len(squares)), 2), 0]),
         joints=np.array([[0, 1, 3, 2]]),
         joint_material=np.zeros(1, dtype=int),
         pressure_edges=np.array([[2, 3]]),
     )
+    return of_order(mesh, order)
 
 
-def block_system(joint, spring=None):
-    """The block as a point mass; `spring` is a massless square in pure shear between the block and a fixed roof."""
-    mesh = block_mesh(spring is not None)
-    held = Constraints.free(mesh).holding(np.array([0, 1]), (0, 1)).tying(np.full(3, 2), np.array([3, 4, 5]), (0, 1))
+def block_system(joint, order, spring=None):
+    """The block as a point mass; `spring` is a light square in pure shear between the block and a fixed roof."""
+    mesh = block_mesh(order, spring is not None)
+    block, ground = np.unique(mesh.triangles[:2]), np.unique(mesh.triangles[-1])
+    held = Constraints.free(mesh).holding(ground, (0, 1)).tying(np.full(len(block), 2), block, (0, 1))
     if spring is not None:
-        held = held.holding(np.array([6, 7]), (0,)).tying(np.full(2, 2), np.array([6, 7]), (1,))
+        above = np.flatnonzero(mesh.nodes[:, 1] > 100)
+        held = held.tying(np.full(len(above), 2), above, (1,)).holding(above[mesh.nodes[above, 1] == 200], (0,))
+        if order == 2:
+            half_way = above[mesh.nodes[above, 1] == 150]
+            held = held.tying(np.full(len(half_way), half_way[0]), half_way, (0,))
     return build_system(mesh, [SOFT] if spring is None else [SOFT, spring], [joint], held)
 
 
@@ -124,7 +132,7 @@ def pulse(t, dt):
     return 500.0 * np.where(np.abs(t - 0.3) < dt / 2, 0.5, t < 0.3)
 
 
-def sliding(dt):
+def sliding(dt, order):
     """All sliding cases side by side, after `dt` and in the order of NAMES."""
     t = np.arange(round(DURATION / dt) + 1) * dt
     sine = np.sin(4 * np.pi * t)
@@ -132,17 +140,22 @@ def sliding(dt):
     stiffness = [RIGID] * 4 + [CASE["penalty"][name]["k_s"] for name in NAMES[4:]]
     uplift = [0.0, 0.3, *[0.0] * 5]
     cases = [Case(np.column_stack([a, 0 * a]), k_s, share) for a, k_s, share in zip(along, stiffness, uplift, strict=True)]
-    return march(block_system(joint(RIGID, RIGID)), cases, dt)
+    return march(block_system(joint(RIGID, RIGID), order), cases, dt)
+
+
+@pytest.fixture(scope="module", params=[1, 2], ids=["T3", "T6"])
+def order(request):
+    return request.param
 
 
 @pytest.fixture(scope="module")
-def fine():
-    return sliding(DT)
+def fine(order):
+    return sliding(DT, order)
 
 
 @pytest.fixture(scope="module")
-def coarse():
-    return sliding(5 * DT)
+def coarse(order):
+    return sliding(5 * DT, order)
 
 
 def at(history, name, time):
@@ -231,9 +244,9 @@ STIFFNESS = 1e4
 DROP = 5.0
 
 
-def bounce(dt, until=1.2):
+def bounce(dt, order, until=1.2):
     """(height (n,), energies (n,), energy account) of a mass dropped on a joint of 1e4 N/cm."""
-    system = block_system(joint(STIFFNESS, STIFFNESS))
+    system = block_system(joint(STIFFNESS, STIFFNESS), order)
     lanes = Lanes.of([GRAVITY * system.weight], [system.joint_law()], [np.zeros((round(until / dt) + 1, 2))])
     state = State.at_rest(system)
     vertical = (system.expand @ np.arange(2.0))[5] == 1.0
@@ -252,8 +265,8 @@ def bounce(dt, until=1.2):
 
 
 @pytest.fixture(scope="module")
-def bounces():
-    return {dt: bounce(dt) for dt in (2e-3, 1e-3, 5e-4, 2.5e-4)}
+def bounces(order):
+    return {dt: bounce(dt, order) for dt in (2e-3, 1e-3, 5e-4, 2.5e-4)}
 
 
 @pytest.mark.parametrize("dt", [2e-3, 1e-3, 5e-4, 2.5e-4])
@@ -305,23 +318,32 @@ LOAD = 245.25
 BASE_STIFFNESS = 500.0
 
 
-def tipping_block(n, quadrature="nodal", mu=2.0):
-    """A stiff block, 100 x 100, on n joint elements; its own deformation is 1e-6 of the joints'."""
+def tipping_block(n, order=1, quadrature="nodal", mu=2.0):
+    """A stiff block, 100 x 100, on n joint elements; its own deformation is 1e-6 of the joints'. The ground's nodes come last."""
     x = np.linspace(0.0, WIDTH, n + 1)
     bottom, top = np.column_stack([x, 0 * x]), np.column_stack([x, 0 * x + WIDTH])
     i = np.arange(n)
-    base, low, high = i, i + n + 1, i + 2 * (n + 1)
-    triangles = np.concatenate([np.column_stack([low, low + 1, high + 1]), np.column_stack([low, high + 1, high])])
+    low, high, base = i, i + n + 1, i + 2 * (n + 1)
+    deep = np.full(n, 3 * (n + 1))
+    triangles = [(low, low + 1, high + 1), (low, high + 1, high), (base + 1, base, deep)]
     mesh = Mesh(
-        nodes=np.concatenate([bottom, bottom, top]),
-        triangles=triangles,
-        material=np.zeros(2 * n, dtype=int),
+        nodes=np.concatenate([bottom, top, bottom, [[WIDTH / 2, -WIDTH]]]),
+        triangles=np.concatenate([np.column_stack(corners) for corners in triangles]),
+        material=np.zeros(3 * n, dtype=int),
         joints=np.column_stack([base, base + 1, low + 1, low]),
         joint_material=np.zeros(n, dtype=int),
+        structure=np.repeat([True, True, False], n),
     )
-    held = Constraints.free(mesh).holding(np.arange(n + 1), (0, 1))
+    mesh = of_order(mesh, order)
+    held = Constraints.free(mesh).holding(np.unique(mesh.triangles[~mesh.structure]), (0, 1))
     material = Material(1e11, 0.0, RHO)
     return build_system(mesh, [material], [JointMaterial(BASE_STIFFNESS, BASE_STIFFNESS, mu)], held, quadrature=quadrature)
+
+
+def underside(system):
+    """Nodes of the block's lower face, from left to right."""
+    nodes = np.unique(system.mesh.joints[:, [2, 3, 5] if system.mesh.order == 2 else [2, 3]])
+    return nodes[np.argsort(system.mesh.nodes[nodes, 0])]
 
 
 def settle(system, loads):
@@ -329,79 +351,119 @@ def settle(system, loads):
     lanes = Lanes.of(loads, [system.joint_law()] * len(loads), [np.zeros((1, 2))] * len(loads))
     state, found = equilibrium(system, lanes, [lanes.standing], natural_frequencies(system, 1)[0])
     assert found.all()
-    n = len(system.mesh.nodes) // 3
-    bottom = (system.expand @ state.motion.u).reshape(-1, 2, lanes.standing.shape[1])[n : 2 * n, 1, : len(loads)]
+    u = (system.expand @ state.motion.u).reshape(-1, 2, lanes.standing.shape[1])
+    bottom = u[underside(system), 1, : len(loads)]
     return -bottom.mean(axis=0), (bottom[0] - bottom[-1]) / WIDTH, (state.contact.state == OPEN)[: len(loads)]
 
 
 def eccentric(system, eccentricity):
     """The load shared between the lower corners."""
-    n = len(system.mesh.nodes) // 3
-    full = np.zeros((3 * n, 2))
-    full[n, 1], full[2 * n - 1, 1] = -LOAD * (0.5 - eccentricity), -LOAD * (0.5 + eccentricity)
+    full = np.zeros_like(system.mesh.nodes)
+    left, *_, right = underside(system)
+    full[left, 1], full[right, 1] = -LOAD * (0.5 - eccentricity), -LOAD * (0.5 + eccentricity)
     return system.expand.T @ full.ravel()
 
 
 @pytest.mark.parametrize("quadrature", ["nodal", "one-point"])
 def test_tilt_on_a_base_without_tension(quadrature):
     table = CASE["tensionless_base"]["five_elements"][quadrature]
-    system = tipping_block(5, quadrature)
+    system = tipping_block(5, quadrature=quadrature)
     settlement, tilt, _ = settle(system, [eccentric(system, e) for e in (1 / 12, 1 / 6, 1 / 4, 1 / 3)])
     # Same finite system as the table's, but for the block's own deformation, 1e-6, and the table's nine digits.
     np.testing.assert_allclose(settlement, [row[0] for row in table.values()], rtol=1e-5, atol=1e-8)
     np.testing.assert_allclose(tilt, [row[1] for row in table.values()], rtol=1e-5)
 
 
-def test_tilt_converges_to_the_continuous_base():
-    """W e/(k B³/12) while the load stays in the core, then s_max/(k c) on what stays closed, c = 3 (B/2 - e)."""
+def on_springs(place, share, eccentricity):
+    """Settlement under the centre and tilt of a rigid block on unilateral springs at `place` with `share` of the base."""
+    arm, closed = place - WIDTH / 2, np.ones(len(place), dtype=bool)
+    while True:
+        k = BASE_STIFFNESS * WIDTH * share * closed
+        matrix = np.array([[k.sum(), k @ arm], [k @ arm, k @ arm**2]])
+        settlement, tilt = np.linalg.solve(matrix, [LOAD, LOAD * WIDTH * eccentricity])
+        if (closed == (settlement + tilt * arm > 0)).all():
+            return settlement, tilt
+        closed = settlement + tilt * arm > 0
+
+
+@pytest.mark.parametrize("kind", ["four nodes", "six nodes"])
+def test_tilt_is_that_of_springs_with_the_joints_weights(kind):
+    """Five elements: springs at their nodes, trapezoidal weights of four nodes and Simpson's of six."""
+    order = {"four nodes": 1, "six nodes": 2}[kind]
+    weights = {1: [1, 2, 2, 2, 2, 1], 2: [1, 4, 2, 4, 2, 4, 2, 4, 2, 4, 1]}[order]
+    place, share = np.linspace(0, WIDTH, 5 * order + 1), np.array(weights) / sum(weights)
+    eccentricity = (1 / 12, 1 / 6, 1 / 4, 1 / 3)
+    expected = np.array([on_springs(place, share, e) for e in eccentricity])
+    system = tipping_block(5, order)
+    settlement, tilt, _ = settle(system, [eccentric(system, e) for e in eccentricity])
+    np.testing.assert_allclose(np.column_stack([settlement, tilt]), expected, rtol=1e-5, atol=1e-8)  # the block's own deformation
+    if order == 1:
+        np.testing.assert_allclose(
+            expected, list(CASE["tensionless_base"]["five_elements"]["nodal"].values()), rtol=1e-6, atol=1e-9
+        )
+
+
+@BOTH_ORDERS
+def test_tilt_converges_to_the_continuous_base(order):
+    """W e/(k B³/12) while the load stays in the core, then s_max/(k c) on what stays closed, c = 3 (B/2 - e).
+
+    Trapezoidal rule with (40 closed) intervals: O(1/n²). Simpson's on pairs of them is exact while all is closed, and after that
+    errs by the kink at the end of what stays closed, O(1/n²) too.
+    """
     eccentricity = np.array([1 / 12, 1 / 6, 1 / 4, 1 / 3, 0.4, 0.45])
     exact = np.array(list(CASE["tensionless_base"]["continuous"].values()))
     wrong = []
-    for n in (20, 40):
-        system = tipping_block(n)
+    for n in (20 // order, 40 // order):
+        system = tipping_block(n, order)
         wrong.append(np.abs(settle(system, [eccentric(system, e) for e in eccentricity])[1] / exact - 1))
     closed = np.minimum(1.0, 3 * (0.5 - eccentricity))  # share of the base
-    assert (wrong[1] < 4 / (40 * closed) ** 2).all()  # trapezoidal rule with (40 closed) intervals: O(1/n²)
-    assert (wrong[1] < wrong[0]).all()
+    assert (wrong[1] < 4 / (40 * closed) ** 2).all()
+    if order == 1:
+        assert (wrong[1] < wrong[0]).all()
+    else:
+        assert wrong[1][:2].max() < 1e-5  # the block's own deformation
 
 
-def test_uplift_starts_at_a_third_of_gravity():
-    """A square block lifts its edge when m a h_cg reaches W B/6, times (1 + 2/n²) for n nodal intervals."""
+@BOTH_ORDERS
+def test_uplift_starts_at_a_third_of_gravity(order):
+    """A square block lifts its edge when m a h_cg reaches W B/6, times (1 + 2/n²) for n trapezoidal intervals."""
     n = 20
-    system = tipping_block(n)
-    start = GRAVITY / 3 * (1 + 2 / n**2)
+    system = tipping_block(n, order)
+    start = GRAVITY / 3 * (1 + 2 / n**2 if order == 1 else 1)
     weight = GRAVITY * system.weight
     _, _, lifted = settle(system, [weight - share * start * system.inertia[0] for share in (0.999, 1.001)])
     assert lifted.sum(axis=1).tolist() == [0, 1]  # 0.1 % off the threshold: a thousand times the block's own deformation
 
 
-def test_small_rocking_takes_its_quarter_period():
+@BOTH_ORDERS
+def test_small_rocking_takes_its_quarter_period(order):
     """A rigid block released at a small tilt about its corner lands after sqrt(2 tilt I/(m g b)), linear kinematics."""
     tilt, half, dt = 1e-3, 50.0, 1e-4
     k_n = 1e6
-    system = tipping_block(1)
+    system = tipping_block(1, order)
     law = system.joint_law([JointMaterial(k_n, k_n, 10.0)])
     lanes = Lanes.of([GRAVITY * system.weight], [law], [np.zeros((900, 2))])
     inertia = MASS * ((2 * half) ** 2 + (2 * half) ** 2) / 12 + 2 * MASS * half**2  # about the corner
     press = MASS * GRAVITY - MASS * MASS * GRAVITY * half**2 / inertia  # the corner's force at release
     push = MASS * MASS * GRAVITY * half**2 / inertia  # the corner holds the centre back horizontally
-    k = k_n * half
+    k = law[0][0]  # of the corner's share of the base
     nodes = system.mesh.nodes
     u = np.column_stack([tilt * nodes[:, 1] + push / k, tilt * (WIDTH - nodes[:, 0]) - press / k])
     state = State.at_rest(system)
     owner = np.array([system.expand[:, [i]].tocoo().row[0] for i in range(system.n_dof)])
     state.motion.u[:, 0] = u.ravel()[owner]
-    gap = system.B @ state.motion.u[:, 0]
-    state.contact.gap[0] = gap
-    sign = np.sign(gap[3] if gap[2] < 0 else gap[1])
-    corner = 1 if gap[2] < 0 else 0
-    state.contact.state[0, corner] = 1
-    state.contact.force[0, 2 * corner : 2 * corner + 2] = -press, sign * push
-    state.contact.slip[0, 1 - corner] = gap[2 * (1 - corner) + 1]
+    gap = (system.B @ state.motion.u[:, 0]).reshape(-1, 2)
+    state.contact.gap[0] = gap.ravel()
+    left, right = np.argsort(system.points.place[:, 0])[[0, -1]]
+    assert gap[right, 0] < 0 < np.delete(gap[:, 0], right).min()
+    state.contact.slip[0] = gap[:, 1]
+    state.contact.slip[0, right] = 0.0
+    state.contact.state[0, right] = STICK
+    state.contact.force[0, 2 * right : 2 * right + 2] = -press, push
     stepper = Stepper(system, Newmark(dt), Rayleigh())
     stepper.start(state, lanes, lanes.ground[0])
     step = 0
-    while state.contact.gap[0, 2 * (1 - corner)] > 0 and step < 900:
+    while state.contact.gap[0, 2 * left] > 0 and step < 900:
         stepper.step(state, lanes, lanes.ground[0], lanes.ground[0])
         step += 1
     quarter = np.sqrt(2 * tilt * inertia / (MASS * GRAVITY * half))
@@ -414,11 +476,11 @@ def test_small_rocking_takes_its_quarter_period():
 
 
 @pytest.fixture(scope="module")
-def pulled():
+def pulled(order):
     """Displacement and slip every `dt`: the moving end of the spring is the load k_p V min(t, 0.5) on the block."""
     dt, k_p, speed = 2e-4, 400.0, 10.0
-    spring = Material(2 * k_p, 0.0, 0.0)  # shear modulus 400 on a square
-    system = block_system(joint(RIGID, 2e4), spring)
+    spring = Material(2 * k_p, 0.0, 1e-9 * RHO)  # shear modulus 400 on a square; next to no mass, which its free nodes need
+    system = block_system(joint(RIGID, 2e4), order, spring)
     t = np.arange(round(1.5 / dt) + 1) * dt
     motion = np.column_stack([-k_p * speed * np.minimum(t, 0.5) / MASS, 0 * t])
     history = march(system, [Case(motion, k_s=2e4)], dt)

@@ -21,8 +21,12 @@ from engine import (
 )
 from engine.kernels.joint import OPEN
 from engine.newmark import MAX_HALVINGS
+from engine.spec import Pressure
+from tests.conftest import PLAIN_MESH
 
-COARSE = {"wall_elements": 1, "roof_elements": 4, "side_elements": 4, "first": 1.0, "largest_width": 2.5, "largest_height": 1.6}
+COARSE = {"order": 1, "wall_elements": 1, "roof_elements": 4, "side_elements": 4, "corner_levels": 0}
+COARSE |= {"first": 1.0, "growth": 2.0, "largest_width": 2.5, "largest_height": 1.6}
+SIX_NODES = {**COARSE, "order": 2}
 DT, DURATION = 0.005, 0.5
 NO_WEIGHT = {"self_weight": False}
 LAYERS = [layer.model_dump() for layer in Spec().layer]
@@ -47,6 +51,12 @@ def box():
     return build_model(case())
 
 
+@pytest.fixture(scope="module", params=[1, 2], ids=["T3", "T6"])
+def either(request, box):
+    """The box on triangles of three nodes, and on as many of six."""
+    return box if request.param == 1 else build_model(case(mesh=SIX_NODES))
+
+
 @pytest.fixture(scope="module")
 def uncovered():
     """The same box with its roof at the surface: under uplift nothing holds it."""
@@ -69,10 +79,10 @@ def same_bits(response, lane, other, other_lane=0):
 
 
 @pytest.mark.parametrize("c", [2.0, 4.0])
-def test_pressure_and_motion_times_c_give_c_times_the_answer_bit_for_bit(box, c):
+def test_pressure_and_motion_times_c_give_c_times_the_answer_bit_for_bit(either, c):
     """(D13): without self-weight every law is homogeneous, and a power of two scales a float without rounding."""
     pair = [case(p0=2e6 * factor, gravity=NO_WEIGHT) for factor in (1.0, c)]
-    response = simulate_cases(box, pair, [shake(), c * shake()])
+    response = simulate_cases(either, pair, [shake(), c * shake()])
     assert response.status.tolist() == [0, 0]
     assert response.fractions[0, :, 1].max() > 0  # it slips, so the law is at work
     one, other = arrays(response, 0), arrays(response, 1)
@@ -92,7 +102,7 @@ WITHOUT_CHATTER = 1e-9
 def mirror(recorder, values):
     """(displacement, stress) of A, B, C, D, S as a mirror shows them."""
     order = [recorder.points.index(name) for name in MIRRORED]
-    return recorder.displacement(values)[..., order, :] * [-1, 1], recorder.stress(values)[..., order, :] * [1, 1, -1]
+    return recorder.displacement(values)[..., order, :] * [-1, 1], recorder.stress(values)[..., order, :] * [1, 1, -1, 1]
 
 
 def assert_mirrored(recorder, values, image):
@@ -100,26 +110,49 @@ def assert_mirrored(recorder, values, image):
         np.testing.assert_allclose(found, expected[..., :5, :], atol=WITHOUT_CHATTER * np.abs(expected).max())
 
 
-def test_mirrored_motion_gives_the_mirrored_answer(box):
-    """Weight alone keeps the joint closed, so it slips and does not chatter."""
-    response = simulate_cases(box, [case(p0=0.0)] * 2, [shake(0.5), -shake(0.5)])
-    assert np.ptp(response.fractions[0, :, 0]) == 0 < np.ptp(response.fractions[0, :, 1])
+def mirrored_section(name):
+    """The section that a mirror shows in this one's place."""
+    member, place = name.rsplit(" ", 1)
+    swapped = {"left": "right", "right": "left", "middle": "middle"}
+    if member in ("roof", "floor"):
+        return f"{member} {swapped[place] if place in swapped else f'{1 - float(place):.3g}'}"
+    return f"{swapped[member.split()[0]]} wall {place}"
+
+
+def assert_sections_mirrored(mesh, forces, image):
+    """N and M as they are, Q with the other sign: along a member it is counted the other way round."""
+    names = list(mesh.sections)
+    order = [names.index(mirrored_section(name)) for name in names]
+    for k, sign in enumerate((1, -1, 1)):
+        found, expected = sign * image[..., order, k], forces[..., k]
+        single = 1e-6  # section forces are kept in single precision
+        np.testing.assert_allclose(found, expected, atol=single * np.abs(expected).max(), err_msg="NQM"[k])
+
+
+def test_mirrored_motion_gives_the_mirrored_answer(either):
+    """Weight alone keeps the joint closed, so it slips and does not chatter; of six nodes, points at corners open a few times."""
+    response = simulate_cases(either, [case(p0=0.0)] * 2, [shake(0.5), -shake(0.5)])
+    opening, slipping = response.fractions[0].T
+    assert np.ptp(slipping) > 0
+    assert np.count_nonzero(np.diff(opening)) <= {1: 0, 2: 8}[either.system.mesh.order]
     assert_mirrored(response.recorder, response.values[0], response.values[1])
+    assert_sections_mirrored(either.system.mesh, response.section_forces[0], response.section_forces[1])
 
 
 def test_mirrored_model_gives_the_mirrored_answer():
     """A box off the middle, to the left and to the right."""
     specs = [case(p0=0.0, box={"offset": offset}) for offset in (-2.0, 2.0)]
-    one, other = (
-        simulate_cases(build_model(spec), [spec], [motion]) for spec, motion in zip(specs, (shake(0.5), -shake(0.5)), strict=True)
-    )
+    models = [build_model(spec) for spec in specs]
+    motions = (shake(0.5), -shake(0.5))
+    one, other = (simulate_cases(model, [model.spec], [motion]) for model, motion in zip(models, motions, strict=True))
     assert np.ptp(one.fractions[0, :, 1]) > 0
     assert_mirrored(one.recorder, one.values[0], other.values[0])
+    assert_sections_mirrored(models[0].system.mesh, one.section_forces[0], other.section_forces[0])
 
 
-def test_symmetric_loads_leave_the_box_upright(box):
+def test_symmetric_loads_leave_the_box_upright(either):
     """Weight and pressure are symmetric: no racking before the shaking, to rounding of the displacements."""
-    response = simulate_cases(box, [case()], [shake()])
+    response = simulate_cases(either, [case()], [shake()])
     racking = response.static_values[0, response.recorder.racking]
     assert abs(racking) < WITHOUT_CHATTER * np.abs(response.recorder.displacement(response.static_values)).max()
 
@@ -159,6 +192,15 @@ def test_lanes_of_the_batch_differ(alone):
     assert len(set(peaks)) == len(peaks)
 
 
+def test_lane_of_six_nodes_is_its_single_case_bit_for_bit():
+    """Joints of three points, sections and stresses that are not uniform in a triangle."""
+    model = build_model(case(mesh=SIX_NODES))
+    chosen = [CASES[i] for i in (3, 0, 1)]
+    batch = simulate_cases(model, [spec for spec, _ in chosen], [motion for _, motion in chosen])
+    for lane, (spec, motion) in enumerate(chosen):
+        assert same_bits(batch, lane, simulate_cases(model, [spec], [motion])) == [], f"lane {lane}"
+
+
 def test_nan_in_a_motion_is_non_finite_and_leaves_companions_alone(box, alone):
     spoilt = shake()
     spoilt[40, 0] = np.nan
@@ -190,7 +232,8 @@ def driven(model, specs, motions):
     """Stepper, lanes and static loads of cases, for `simulate` or for a march of one's own."""
     loads = [(model.weight(spec), model.pressure(spec)) for spec in specs]
     laws = [model.system.joint_law(model.joint_materials(spec)) for spec in specs]
-    lanes = Lanes.of([weight + pressure for weight, pressure in loads], laws, motions)
+    behind = [model.behind_sections(spec) for spec in specs]
+    lanes = Lanes.of([weight + pressure for weight, pressure in loads], laws, motions, behind)
     static = [np.zeros_like(lanes.standing) for _ in range(2)]
     for lane, pair in enumerate(loads):
         static[0][:, lane], static[1][:, lane] = pair
@@ -198,10 +241,10 @@ def driven(model, specs, motions):
 
 
 @pytest.mark.parametrize("p0", [0.0, 2e6])
-def test_at_rest_stays_at_rest(box, p0):
+def test_at_rest_stays_at_rest(either, p0):
     """No motion: what moves is the residual of the static stage, 1e-10 of the loads (D10), and it does not grow."""
-    stepper, lanes, static = driven(box, [case(p0=p0)], [0 * shake()])
-    state, found = equilibrium(box.system, lanes, static, box.frequencies[0])
+    stepper, lanes, static = driven(either, [case(p0=p0)], [0 * shake()])
+    state, found = equilibrium(either.system, lanes, static, either.frequencies[0])
     assert found[0]
     at_rest = state.motion.u.copy()
     slip = state.contact.slip.copy()
@@ -212,7 +255,7 @@ def test_at_rest_stays_at_rest(box, p0):
         fastest = max(fastest, np.abs(state.motion.v[:, 0]).max())
         farthest = max(farthest, np.abs(state.motion.u[:, 0] - at_rest[:, 0]).max())
     size = np.abs(at_rest[:, 0]).max()
-    omega = 2 * np.pi * box.frequencies[0]
+    omega = 2 * np.pi * either.frequencies[0]
     # A residual of 1e-10 of the load moves a spring by 1e-10 of its settlement, twice that as a sudden load; five for its shape.
     assert farthest < 1e-9 * size
     assert fastest < 1e-9 * size * omega
@@ -250,8 +293,8 @@ def test_no_load_at_all_then_shaking_works(box):
 # --- from the static stage into the shaking
 
 
-def test_histories_begin_with_the_static_state_and_peaks_come_with_and_without_it(box):
-    response = simulate_cases(box, [case(), case(p0=0.0)], [shake()] * 2)
+def test_histories_begin_with_the_static_state_and_peaks_come_with_and_without_it(either):
+    response = simulate_cases(either, [case(), case(p0=0.0)], [shake()] * 2)
     np.testing.assert_array_equal(response.values[:, 0], response.static_values)
     np.testing.assert_array_equal(response.peaks[:, 0], np.abs(response.values).max(axis=1))
     away = np.abs(response.values - response.static_values[:, None]).max(axis=1)
@@ -279,12 +322,13 @@ def test_sparse_histories_are_samples_of_the_full_one_and_peaks_see_all(box):
 # --- energy
 
 
-@pytest.fixture(scope="module")
-def reference_problem():
-    """coral-2010 as it is preset, at two time steps, shaken for 0.6 s: under 2 MPa the box hangs between roof and walls."""
+@pytest.fixture(scope="module", params=[PLAIN_MESH.model_dump(), SIX_NODES], ids=["T3", "T6"])
+def reference_problem(request):
+    """coral-2010 at two time steps, shaken for 0.6 s: under 2 MPa the box hangs between roof and walls."""
     responses = {}
     for dt in (0.005, 0.0025):
-        spec = Spec.model_validate({"time": {"dt": dt, "duration": 0.6}, "output": {"every": 1}})
+        tables = {"time": {"dt": dt, "duration": 0.6}, "output": {"every": 1}}
+        spec = Spec.model_validate({**tables, "mesh": request.param})
         motion = shake(dt=dt, duration=0.6)
         responses[dt] = simulate_cases(build_model(spec), [spec], [motion])
     return responses
@@ -293,10 +337,10 @@ def reference_problem():
 def test_covered_box_is_held_under_every_pressure():
     """From its weight alone to an uplift of twenty times that: roof and walls hold it, so there is an equilibrium (D10)."""
     pressures = np.linspace(0.05e6, 4e6, 80)
-    model = build_model(Spec())
+    model = build_model(Spec(mesh=PLAIN_MESH))
     lost = []
     for batch in pressures.reshape(-1, LANES):
-        specs = [Spec.model_validate({"pressure": {"p0": p0}}) for p0 in batch]
+        specs = [Spec(mesh=PLAIN_MESH, pressure=Pressure(p0=p0)) for p0 in batch]
         response = simulate_cases(model, specs, [np.zeros((2, 2))] * LANES)
         lost += [float(p0) for p0, status in zip(batch, response.status, strict=True) if status != Status.DONE]
     assert lost == []
@@ -450,10 +494,10 @@ def test_no_equilibrium_is_an_exception_that_names_the_case(uncovered):
         simulate(stepper, lanes, static, uncovered.frequencies[0], throw=True)
 
 
-def test_open_joint_carries_nothing(box):
+def test_open_joint_carries_nothing(either):
     """Where the static stage leaves a joint open it has a gap and no force; where closed, it is pressed (D3)."""
-    _, lanes, static = driven(box, [case()], [shake()])
-    state, _ = equilibrium(box.system, lanes, static, box.frequencies[0])
+    _, lanes, static = driven(either, [case()], [shake()])
+    state, _ = equilibrium(either.system, lanes, static, either.frequencies[0])
     is_open, force = state.contact.state[0] == OPEN, state.contact.force[0].reshape(-1, 2)
     gap = state.contact.gap[0, ::2]
     assert is_open.any()

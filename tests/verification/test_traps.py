@@ -1,20 +1,26 @@
 """One test for each mistake that is easily made here and still gives a plausible answer. Each was planted once and caught."""
 
 from dataclasses import fields
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from engine import (
+    LANES,
     Constraints,
     JointMaterial,
     Lanes,
     Material,
     Mesh,
+    MeshError,
     Newmark,
     Rayleigh,
+    Section,
+    SectionForces,
     Spec,
+    State,
     Stepper,
     build_model,
     build_system,
@@ -24,11 +30,17 @@ from engine import (
     simulate,
     simulate_cases,
 )
+from engine.condensed import factorise, solve
+from engine.kernels.observe import section_forces
+from engine.kernels.sparse import product
 from engine.model import materials
 from engine.simulate import PENETRATION, PRESSURE
+from tests.verification.orders import BOTH_ORDERS, of_order
 
 EXACT = 1e-10  # what rounding leaves of small linear systems, of condition 1e5 at most
-COARSE = {"wall_elements": 1, "roof_elements": 4, "side_elements": 4, "first": 1.0, "largest_width": 2.5, "largest_height": 1.6}
+COARSE = {"order": 1, "wall_elements": 1, "roof_elements": 4, "side_elements": 4, "corner_levels": 0}
+COARSE |= {"first": 1.0, "growth": 2.0, "largest_width": 2.5, "largest_height": 1.6}
+SIX_NODES = {**COARSE, "order": 2}
 
 
 def case(**changes):
@@ -42,6 +54,12 @@ def box():
     return build_model(case())
 
 
+@pytest.fixture(scope="module", params=[1, 2], ids=["T3", "T6"])
+def either(request, box):
+    """The box on triangles of three nodes, and on as many of six."""
+    return box if request.param == 1 else build_model(case(mesh=SIX_NODES))
+
+
 def shake(peak, n=61, dt=0.005):
     """A windowed sine of 12 Hz along the base."""
     t = np.arange(n) * dt
@@ -53,17 +71,19 @@ SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
 HALVES = np.array([(0, 1, 3), (0, 3, 2)])
 
 
-def block(joint, angle=0.0):
-    """A block of mass 1 whose nodes move as one, on two fixed nodes; its base is inclined by `angle`."""
+def block(joint, angle=0.0, order=1):
+    """A block of mass 1 whose nodes move as one, on two nodes of the ground; its base is inclined by `angle`."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     mesh = Mesh(
-        nodes=np.concatenate([SQUARE[:2], SQUARE]) @ turn.T,
-        triangles=HALVES + 2,
-        material=np.zeros(2, dtype=int),
+        nodes=np.concatenate([SQUARE[:2], SQUARE, [[0.5, -1.0]]]) @ turn.T,
+        triangles=np.concatenate([HALVES + 2, [[0, 6, 1]]]),
+        material=np.zeros(3, dtype=int),
         joints=np.array([[0, 1, 3, 2]]),
         joint_material=np.zeros(1, dtype=int),
     )
-    held = Constraints.free(mesh).holding(np.array([0, 1]), (0, 1)).tying(np.full(3, 2), np.array([3, 4, 5]), (0, 1))
+    mesh = of_order(mesh, order)
+    rigid, ground = np.unique(mesh.triangles[:2]), np.unique(mesh.triangles[2])
+    held = Constraints.free(mesh).holding(ground, (0, 1)).tying(np.full(len(rigid), 2), rigid, (0, 1))
     return build_system(mesh, [Material(1.0, 0.25, 1.0)], [joint], held)
 
 
@@ -124,47 +144,49 @@ def column_frequency(rows):
     return brentq(base_displacement, trials[first - 1], trials[first]) / (2 * np.pi)
 
 
-def test_pressure_acts_on_the_box_and_inward(box):
+def test_pressure_acts_on_the_box_and_inward(either):
     """2 MPa: roof 0.571 MPa down, floor 1.143 MPa up, walls inward, nothing on the ground; net uplift 2.857 MN/m."""
-    system, spec = box.system, box.spec
+    system = either.system
     mesh = system.mesh
-    force = system.nodal(box.pressure(spec))
-    on_box = np.unique(mesh.triangles[mesh.structure])
-    assert not np.delete(force, on_box, axis=0).any()
+    force = system.nodal(either.pressure(either.spec))
+    face = np.unique(mesh.pressure_edges)
+    assert not np.delete(force, face, axis=0).any()
+    assert mesh.structure[np.isin(mesh.triangles, face).sum(axis=1) == 1 + mesh.order].all()  # sides on the box alone
     assert force.sum(axis=0) == pytest.approx((0.0, 2e6 * 4 / 14 * 5), abs=1e-3)  # rounding of 1e6
-    x, y = mesh.nodes[on_box].T
+    (x, y), force = mesh.nodes[face].T, force[face]
     inside = np.abs(x) < 2.5 - 1e-9
-    assert force[on_box][inside & (y == -4)][:, 1].max() < 0 < force[on_box][inside & (y == -8)][:, 1].min()
+    assert force[inside & (y == -4)][:, 1].max() < 0 < force[inside & (y == -8)][:, 1].min()
     middle = (y < -4) & (y > -8)
-    assert force[on_box][middle & (x < -2.4)][:, 0].min() > 0 > force[on_box][middle & (x > 2.4)][:, 0].max()
+    assert force[middle & (x < 0)][:, 0].min() > 0 > force[middle & (x > 0)][:, 0].max()
 
 
-def test_pressure_squeezes_the_box_and_lifts_it_off_its_floor(box):
-    response = simulate_cases(box, [case()], [np.zeros((2, 2))])
+def test_pressure_squeezes_the_box_and_lifts_it_off_its_floor(either):
+    response = simulate_cases(either, [case()], [np.zeros((2, 2))])
     recorder = response.recorder
     u = dict(zip(recorder.points, recorder.displacement(response.static_values[0]), strict=True))
     assert u["A"][1] < u["D"][1]  # roof and floor approach each other
     assert u["C"][0] > 0 > u["B"][0]  # and so do the walls
     assert u["D"][1] > 0  # net uplift
-    points = box.system.points
+    points = either.system.points
     floor, roof = points.normal[:, 1] > 0.5, points.normal[:, 1] < -0.5
     assert response.static_open[0, floor].all()
     assert not response.static_open[0, roof].all()
 
 
+@BOTH_ORDERS
 @pytest.mark.parametrize("degrees", [30, 120, -75, 200])
-def test_joint_turns_with_its_element(degrees):
+def test_joint_turns_with_its_element(degrees, order):
     """A press and a push along an inclined joint move the block by press/k_n and push/k_s in the joint's own axes (D2)."""
     angle, press, push = np.radians(degrees), 3.0, 0.5
     tangent, normal = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
-    system = block(JointMaterial(1000.0, 300.0, 0.9), angle)
+    system = block(JointMaterial(1000.0, 300.0, 0.9), angle, order)
     lanes = one_lane(system, nodal_load(system, 2, push * tangent - press * normal), np.zeros((1, 2)))
     state, found = equilibrium(system, lanes, [lanes.standing], natural_frequencies(system, 1)[0])
     assert found[0]
     moved = (system.expand @ state.motion.u)[4:6, 0]
     # 1e-9: the proximal stage stops at a residual of 1e-10 of the load
     np.testing.assert_allclose(moved, push / 300 * tangent - press / 1000 * normal, atol=1e-9)
-    np.testing.assert_allclose(state.contact.gap[0].reshape(-1, 2), [[-press / 1000, push / 300]] * 2, atol=1e-9)
+    np.testing.assert_allclose(state.contact.gap[0].reshape(-1, 2), [[-press / 1000, push / 300]] * (1 + order), atol=1e-9)
 
 
 def test_joint_forgets_its_old_place_when_it_closes_again():
@@ -213,22 +235,24 @@ def welded(model):
     """The model's mesh with the box's nodes merged into those of the ground, no joints."""
     mesh = model.system.mesh
     other = np.arange(len(mesh.nodes))
-    other[mesh.joints[:, 3]], other[mesh.joints[:, 2]] = mesh.joints[:, 0], mesh.joints[:, 1]
+    for ground, structure in ((0, 3), (1, 2), (4, 5))[: 1 + mesh.order]:
+        other[mesh.joints[:, structure]] = mesh.joints[:, ground]
     used, triangles = np.unique(other[mesh.triangles], return_inverse=True)
     new = np.full(len(mesh.nodes), -1)
     new[used] = np.arange(len(used))
     one = Mesh(
         nodes=mesh.nodes[used],
-        triangles=triangles.reshape(-1, 3),
+        triangles=triangles.reshape(mesh.triangles.shape),
         material=mesh.material,
         boundaries={name: new[nodes] for name, nodes in mesh.boundaries.items()},
     )
     return build_system(one, materials(model.spec), (), Constraints.of_sides(one, "tied"))
 
 
-def test_rayleigh_frequencies_are_those_of_the_bonded_system():
+@pytest.mark.parametrize("mesh", [COARSE, SIX_NODES], ids=["T3", "T6"])
+def test_rayleigh_frequencies_are_those_of_the_bonded_system(mesh):
     """Under 2 MPa most of the joint is open and the floating box has frequencies near zero: they do not set the damping (D5)."""
-    model = build_model(case(joint={"thickness": 1e-5}))  # joints so stiff that the box is as good as welded
+    model = build_model(case(joint={"thickness": 1e-5}, mesh=mesh))  # joints so stiff that the box is as good as welded
     frequencies = natural_frequencies(welded(model), 6)
     # a joint adds the flexibility of 1e-5 m of ground to paths of metres: 1e-5 of the stiffness, and ten for what is local
     np.testing.assert_allclose(model.frequencies, frequencies, rtol=1e-4)
@@ -244,23 +268,28 @@ def test_damping_does_not_depend_on_what_opens(box):
     assert box.frequencies[0] > 10  # Hz; the ground alone has 18.45
 
 
-def test_compression_is_negative():
-    """A column under its weight: sigma_yy = -rho g z, sigma_xx = nu/(1 - nu) of it; lifted by as much it is in tension."""
+@BOTH_ORDERS
+def test_compression_is_negative(order):
+    """A column under its weight: sigma_yy = -rho g z, sigma_xx = nu/(1 - nu) of it; lifted by as much it is in tension.
+
+    Three nodes know the mean of their element between 4 and 6 m, six the stress at the point itself, 5.2 m deep.
+    """
     spec = Spec(layer=[{"bottom": 10, "E": 1e8, "nu": 0.25, "density": 2000, "friction": 0.3}])
-    mesh = column_mesh(np.linspace(-10.0, 0.0, 6), spec.layer).with_probe("P", 0.7, -5.2)
+    mesh = column_mesh(np.linspace(-10.0, 0.0, 6), spec.layer, order).with_probe("P", 0.7, -5.2)
     system = build_system(mesh, materials(spec), (), Constraints.of_sides(mesh, "tied"))
     loads = [10.0 * system.weight, -10.0 * system.weight]
     lanes = Lanes.of(loads, [system.joint_law()] * 2, [np.zeros((2, 2))] * 2)
     frequency = natural_frequencies(system, 1)[0]
     response = simulate(Stepper(system, Newmark(0.01), Rayleigh()), lanes, [lanes.standing], frequency)
     stress = response.recorder.stress(response.static_values)[:, 0]
-    vertical = 2000 * 10.0 * 5.0  # of the element between 4 and 6 m
-    # nodal values of linear elements are exact here; 1e-9 is left by the proximal stage's residual
-    np.testing.assert_allclose(stress, vertical * np.array([[-1 / 3, -1, 0], [1 / 3, 1, 0]]), atol=1e-9 * vertical)
+    vertical = 2000 * 10.0 * {1: 5.0, 2: 5.2}[order]
+    ratios = np.array([-1 / 3, -1, 0, -1 / 3])  # sigma_zz = nu (sigma_xx + sigma_yy)
+    # nodal values are exact here; 1e-9 is left by the proximal stage's residual
+    np.testing.assert_allclose(stress, vertical * np.array([ratios, -ratios]), atol=1e-9 * vertical)
 
 
-def test_pressed_wall_is_in_compression_and_contact_pressure_is_positive(box):
-    response = simulate_cases(box, [case(pressure={"p0": 0.0})], [np.zeros((2, 2))])
+def test_pressed_wall_is_in_compression_and_contact_pressure_is_positive(either):
+    response = simulate_cases(either, [case(pressure={"p0": 0.0})], [np.zeros((2, 2))])
     recorder = response.recorder
     stress = dict(zip(recorder.points, recorder.stress(response.static_values[0]), strict=True))
     assert stress["B"][1] < 0 > stress["C"][1]  # the walls carry the overburden
@@ -282,9 +311,9 @@ def test_static_state_is_carried_into_the_shaking():
     assert response.fractions[0, :, 1].max() == 1  # and it does slide
 
 
-def test_slip_of_the_static_stage_is_carried_into_the_shaking(box):
+def test_slip_of_the_static_stage_is_carried_into_the_shaking(either):
     """Joints that slid under weight and pressure stay where they are when nothing shakes them."""
-    response = simulate_cases(box, [case()], [np.zeros((40, 2))])
+    response = simulate_cases(either, [case()], [np.zeros((40, 2))])
     settled = response.recorder.displacement(response.static_values)
     moved = response.recorder.displacement(response.peaks[:, 1])
     assert moved.max() < 1e-9 * np.abs(settled).max()  # the static residual is 1e-10 of the loads
@@ -292,15 +321,17 @@ def test_slip_of_the_static_stage_is_carried_into_the_shaking(box):
     assert response.joint_peaks[0, 1].max() > 1e-2 * np.abs(settled).max()
 
 
+@BOTH_ORDERS
 @pytest.mark.parametrize(("direction", "modulus"), [(0, 4e6), (1, 12e6)])
-def test_inertia_of_the_supported_nodes_loads_their_neighbours(direction, modulus):
+def test_inertia_of_the_supported_nodes_loads_their_neighbours(direction, modulus, order):
     """A square on the base under constant acceleration settles at rho a H²/(2 modulus); without M_fb at two thirds of it (D4)."""
     mesh = Mesh(
         nodes=SQUARE,
         triangles=HALVES,
         material=np.zeros(2, dtype=int),
         boundaries={"base": np.array([0, 1]), "left": np.array([0, 2]), "right": np.array([1, 3])},
-    ).with_probe("top", 0.5, 1.0)
+    )
+    mesh = of_order(mesh, order).with_probe("top", 1.0, 1.0)
     system = build_system(mesh, [Material(1e7, 0.25, 1000.0)], (), Constraints.of_sides(mesh, "tied"))
     ground = np.zeros((2001, 2))
     ground[:, direction] = 3.0
@@ -334,9 +365,10 @@ def test_block_in_a_corner_is_held_by_both_faces():
     assert (pressing[on_floor].sum(), pressing[~on_floor].sum()) == pytest.approx((3.0, 2.0), rel=1e-8)
 
 
-def test_every_corner_of_the_box_has_two_points_with_their_own_normals():
+@pytest.mark.parametrize("mesh", [COARSE, SIX_NODES], ids=["T3", "T6"])
+def test_every_corner_of_the_box_has_two_points_with_their_own_normals(mesh):
     """In a single layer, where nothing but the normal tells the two points of a corner apart."""
-    system = build_model(case(layer=[{"bottom": 14, "E": 1e9, "nu": 0.25, "density": 2000, "friction": 0.4}])).system
+    system = build_model(case(mesh=mesh, layer=[{"bottom": 14, "E": 1e9, "nu": 0.25, "density": 2000, "friction": 0.4}])).system
     points, corners = system.points, system.mesh.nodes[system.mesh.corners]
     for corner in corners:
         there = np.flatnonzero(np.linalg.norm(points.place - corner, axis=1) < 1e-9)
@@ -346,3 +378,182 @@ def test_every_corner_of_the_box_has_two_points_with_their_own_normals():
     for normal, length in (((0, 1), 5), ((0, -1), 5), ((1, 0), 4), ((-1, 0), 4)):
         face = points.normal @ normal > 0.5
         assert points.length[face].sum() == pytest.approx(length, rel=1e-12)  # rounding
+
+
+# --- six nodes
+
+
+def test_middle_nodes_in_another_order_are_refused():
+    """Sides 1-2, 2-3, 3-1; an order that begins with the side across from corner 1 is common elsewhere and folds the element."""
+    corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
+    middles = [(0.5, 0.0), (0.5, 0.5), (0.0, 0.5)]
+    Mesh(nodes=[*corners, *middles], triangles=[[0, 1, 2, 3, 4, 5]], material=[0])
+    for order in ([4, 5, 3], [5, 3, 4], [4, 3, 5]):
+        with pytest.raises(MeshError, match="triangles"):
+            Mesh(nodes=[*corners, *middles], triangles=[[0, 1, 2, *order]], material=[0])
+
+
+def test_tied_sides_pair_nodes_of_one_height():
+    """Middle nodes come after the corners and in their order, however the nodes are numbered."""
+    x, y = np.tile([0.0, 1.0], 5), np.repeat(np.arange(5.0), 2)
+    number = np.array([3, 0, 9, 2, 1, 8, 5, 4, 7, 6])
+    nodes = np.empty((10, 2))
+    nodes[number] = np.column_stack([x, y])
+    sw = 2 * np.arange(4)
+    triangles = np.concatenate([np.column_stack([sw, sw + 1, sw + 3]), np.column_stack([sw, sw + 3, sw + 2])])
+    sides = {"left": number[::2], "right": number[1::2], "base": number[:2]}
+    mesh = Mesh(nodes=nodes, triangles=number[triangles], material=np.zeros(8, dtype=int), boundaries=sides).quadratic()
+    for name in ("left", "right"):
+        np.testing.assert_array_equal(mesh.nodes[mesh.boundaries[name], 1], [0, 1, 2, 3, 4, 0.5, 1.5, 2.5, 3.5])
+
+
+@BOTH_ORDERS
+def test_even_load_presses_the_joint_evenly(order):
+    """Forces of points are their shares of the length, 1/6, 4/6, 1/6 of six nodes; the pressure is W/L at each."""
+    system = block(JointMaterial(1000.0, 300.0, 0.9), order=order)
+    lanes = one_lane(system, 10.0 * system.weight, np.zeros((2, 2)))
+    response = simulate(Stepper(system, Newmark(0.01), Rayleigh()), lanes, [lanes.standing], natural_frequencies(system, 1)[0])
+    # 1e-9: the proximal stage stops at a residual of 1e-10 of the load
+    np.testing.assert_allclose(response.joint_peaks[0, PRESSURE], 10.0, rtol=1e-9)
+    shares = {1: [1 / 2, 1 / 2], 2: [1 / 6, 4 / 6, 1 / 6]}[order]
+    along = np.argsort(system.points.place[:, 0])
+    np.testing.assert_allclose(system.points.length[along], shares, rtol=1e-12)  # rounding
+
+
+# --- sections
+
+
+def cantilever(order, along=(1.0, 0.0)):
+    """A strip 4 long and 1 deep from x = 0, where it is held, with a cut in its middle; cells of 0.5."""
+    x, y = np.linspace(0, 4, 9), np.linspace(-0.5, 0.5, 3)
+    nodes = np.column_stack([np.tile(x, 3), np.repeat(y, 9)])
+    sw = (9 * np.arange(2)[:, None] + np.arange(8)).ravel()
+    triangles = np.concatenate([np.column_stack([sw, sw + 1, sw + 10]), np.column_stack([sw, sw + 10, sw + 9])])
+    held = np.array([0, 9, 18])
+    mesh = Mesh(
+        nodes=nodes,
+        triangles=triangles,
+        material=np.zeros(len(triangles), dtype=int),
+        boundaries={"base": held},
+        structure=np.ones(len(triangles), dtype=bool),
+    ).with_section("cut", Section(2.0, 0.0, held + 4, np.array(along)))
+    mesh = of_order(mesh, order)
+    constraints = Constraints.free(mesh).holding(mesh.boundaries["base"], (0, 1))
+    return build_system(mesh, [Material(1000.0, 0.25, 1.0)], constraints=constraints)
+
+
+@BOTH_ORDERS
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_section_signs_at_a_cantilever(order, sign):
+    """Tip force (5, 3): N = 5 pulls; along +x, what lies ahead pushes up, Q = 3, and the upper, inner face is pressed: M = -6.
+
+    Along -x the wall is behind no more but ahead, and the inner face is the lower one, which is pulled: N = 5, Q = 3, M = 6.
+    """
+    system = cantilever(order, (sign, 0.0))
+    lanes = one_lane(system, nodal_load(system, 17, (5.0, 3.0)), np.zeros((2, 2)))
+    response = simulate(Stepper(system, Newmark(0.01), Rayleigh()), lanes, [lanes.standing], natural_frequencies(system, 1)[0])
+    # 1e-6: kept in single precision
+    assert response.section_forces[0, -1, 0] == pytest.approx((5.0, 3.0, -6.0 * sign), rel=1e-6)
+
+
+@BOTH_ORDERS
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_section_forces_hold_the_inertia_of_what_they_carry(order, sign):
+    """A rod that its base pushes along at 3 m/s², at rest in it: N = -rho a A (L - s), from either side of the cut."""
+    system = cantilever(order, (sign, 0.0))
+    motion, ground = State.at_rest(system).motion, np.zeros((2, LANES))
+    ground[0] = 3.0
+    motion.u[:] = -system.inertia.T @ ground
+    solve(factorise(system.K, system.n_interior), motion.u)
+    values = np.zeros((3, LANES))
+    section_forces(SectionForces.of(system).cut, 0.0, 0.0, motion, ground, values)
+    assert values[:, 0] == pytest.approx((-6.0, 0.0, 0.0), rel=EXACT, abs=EXACT)
+
+
+@BOTH_ORDERS
+def test_sections_hold_the_weight_behind_them(order):
+    """A cantilever under its weight: Q and M from either side agree, with the weight on the cut's own nodes counted once."""
+    gravity, found = 10.0, []
+    for sign in (1.0, -1.0):
+        system = cantilever(order, (sign, 0.0))
+        behind = SectionForces.of(system).loads(gravity, np.zeros(len(system.mesh.nodes)))
+        load = gravity * system.weight
+        lanes = Lanes.of([load], [system.joint_law()], [np.zeros((2, 2))], [behind])
+        response = simulate(Stepper(system, Newmark(0.01), Rayleigh()), lanes, [lanes.standing], 1.0)
+        found.append(response.section_forces[0, -1, 0])
+    # 20 N hang on the cut, 1 m from it: on what lies left they act down; 1e-6: kept in single precision
+    assert found[0] == pytest.approx((0.0, -20.0, 20.0), rel=1e-6, abs=1e-5)
+    assert found[1] == pytest.approx((0.0, -20.0, -20.0), rel=1e-6, abs=1e-5)
+
+
+@pytest.mark.parametrize("depth", [0.0, 4.0])
+@pytest.mark.parametrize("order", [1, 2], ids=["T3", "T6"])
+def test_sections_of_refined_boxes_cut_their_members_through(order, depth):
+    """Bisection puts nodes at one height that no side joins; a cut along them would leave out part of the wall."""
+    spec = case(mesh={**COARSE, "order": order, "corner_levels": 4}, box={"depth": depth})
+    mesh = build_model(spec).system.mesh
+    sides = {frozenset(pair) for t in mesh.triangles[:, :3].tolist() for pair in zip(t, t[1:] + t[:1], strict=True)}
+    corners = np.unique(mesh.triangles[:, :3])
+    for name, section in mesh.sections.items():
+        across = mesh.nodes[section.nodes] @ section.inward
+        assert np.ptp(across) == pytest.approx(0.5, rel=1e-12), name  # rounding
+        chain = [int(node) for node in section.nodes[np.argsort(across)] if node in corners]
+        assert all(frozenset(pair) in sides for pair in pairwise(chain)), name
+
+
+def on_piece(model, force, first, last):
+    """Force (2,) of joints, water and weight on the piece of a member between two of its sections; force (n_point, 2) of joints.
+
+    Water by its mean over the outer face, joint forces by the length that their elements have there.
+    """
+    system, spec, mesh = model.system, model.spec, model.system.mesh
+    points, along, inward = system.points, first.along, first.inward
+    start, end = (np.array([section.x, section.y]) for section in (first, last))
+
+    def between(place):
+        s = (place - start) @ along
+        return (s > 0) & (s < np.linalg.norm(end - start)) & (np.abs((place - start) @ inward) < 0.3)
+
+    part = between(mesh.nodes[mesh.joints[:, :2]].mean(axis=1)[points.parts[:, 0]])
+    point = points.parts[part, 1]
+    normal = points.normal[point]
+    tangent = np.column_stack([normal[:, 1], -normal[:, 0]])
+    traction = force[point] / points.area[point, None]
+    pushed = -(traction[:, :1] * normal + traction[:, 1:] * tangent) * points.part_lengths[part, None]
+    depth = -((start + end) / 2 - spec.box.wall / 2 * inward)[1]
+    water = spec.pressure.p0 * depth / spec.pressure.reference_height * np.linalg.norm(end - start)
+    area = np.linalg.norm(end - start) * spec.box.wall
+    weight = spec.box.density * spec.gravity.acceleration * area
+    return pushed.sum(axis=0) + water * inward - [0.0, weight]
+
+
+def test_section_forces_balance_what_acts_between_them(either):
+    """Water, weight and joints on a piece of roof or wall: the difference of the forces at its two ends."""
+    system, forces = either.system, either.sections
+    loads = [either.weight(either.spec), either.pressure(either.spec)]
+    lanes = one_lane(system, sum(loads), np.zeros((2, 2)))
+    state, found = equilibrium(system, lanes, [lanes.standing], either.frequencies[0])
+    assert found[0]
+    values, of_joints = np.zeros((2, len(forces.edges) * 3, LANES))
+    section_forces(forces.cut, 0.0, 0.0, state.motion, np.zeros((2, LANES)), values)
+    product(forces.joints, np.ascontiguousarray(state.contact.force.T), of_joints)
+    N, Q, _ = ((values + of_joints)[:, 0] - either.behind_sections(either.spec)).reshape(-1, 3).T
+    size = np.abs(N).max()
+    sections = list(system.mesh.sections.values())
+    assert np.abs(state.contact.force[0]).max() > 1e-2 * size  # the joints do press
+    for member in ("floor", "roof", "left wall", "right wall"):
+        chosen = [i for i, name in enumerate(system.mesh.sections) if name.startswith(member)]
+        chosen.sort(key=lambda i: sections[i].x * sections[i].along[0] + sections[i].y * sections[i].along[1])
+        for i, j in pairwise(chosen):
+            ends = (N[j] - N[i]) * sections[i].along + (Q[j] - Q[i]) * sections[i].inward
+            acting = on_piece(either, state.contact.force[0].reshape(-1, 2), sections[i], sections[j])
+            # the static stage leaves a residual of 1e-10 of the loads (D10)
+            np.testing.assert_allclose(ends, -acting, rtol=0, atol=1e-8 * size)
+
+
+def test_pressed_roof_is_in_compression_and_pulled_inside(either):
+    """Water and ground press the box: N < 0 in every member, M > 0 in the middle of roof and floor."""
+    response = simulate_cases(either, [case()], [np.zeros((2, 2))])
+    forces = dict(zip(either.system.mesh.sections, response.section_forces[0, 0], strict=True))
+    assert all(N < 0 for N, _, _ in forces.values())
+    assert forces["roof middle"][2] > 0 < forces["floor middle"][2]

@@ -9,8 +9,9 @@ import pytest
 from engine.condensed import MAX_ROUNDS
 from engine.kernels import contact
 from engine.kernels.contact import STATE_TOLERANCE
+from engine.kernels.direct import EQUATION_TOLERANCE
 from engine.kernels.joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from engine.kernels.states import EQUATION_TOLERANCE, Law, workspace
+from engine.kernels.states import Law, workspace
 
 PLAIN = bool(numba.config.DISABLE_JIT)  # plain Python is slow: a sample of small problems then
 N_PROBLEM, LARGEST = (60, 5) if PLAIN else (600, 16)
@@ -147,12 +148,13 @@ def test_own_solution_as_start_takes_one_round(problem):
     warm = Problem(**{**vars(problem), "state": state, "force": force})
     rounds, _, gap_again, force_again, state_again = warm.solve()
     assert rounds == 1
-    for first, second in ((gap, gap_again), (force, force_again), (state, state_again)):
-        np.testing.assert_array_equal(first, second)
+    np.testing.assert_array_equal(state, state_again)
+    for first, second in ((gap, gap_again), (force, force_again)):  # the factor may be of other states: not the same bits
+        np.testing.assert_allclose(first, second, atol=10 * EQUATION_TOLERANCE * abs(first).max())
 
 
-def test_kept_factor_changes_no_bit(problem):
-    """The factor of the last step serves as long as the states last; what it holds otherwise does not matter."""
+def test_kept_factor_changes_rounding_alone(problem):
+    """The factor of the last step serves as long as the states last; from one of other states the solution is the same."""
     _, _, _, force, state = problem.solve()
     warm = Problem(**{**vars(problem), "state": state, "force": force})
     work = workspace(len(problem.k_n), 1)
@@ -160,9 +162,11 @@ def test_kept_factor_changes_no_bit(problem):
     assert (work.factored[0] == state).all()
     problem.solve(work=work)
     third = warm.solve(work=work)
-    for other in (second, third):
-        for a, b in zip(first, other, strict=True):
-            np.testing.assert_array_equal(a, b)
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(first[4], third[4])
+    for a, b in zip(first[2:4], third[2:4], strict=True):
+        np.testing.assert_allclose(a, b, atol=10 * EQUATION_TOLERANCE * abs(a).max())
 
 
 @pytest.mark.parametrize("factor", [2.0**-30, 2.0**10])

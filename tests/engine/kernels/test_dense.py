@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from engine.kernels import dense
+from engine.kernels.jit import LANES
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 10, 40])
@@ -56,3 +57,16 @@ def test_only_the_leading_block_is_read_and_written():
 
 def test_nothing_to_solve_is_fine():
     assert dense.factorise(np.zeros((2, 2)), 0, np.zeros(2, dtype=np.int64))
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 3, 7, 8, 41])
+def test_lanes_are_solved_as_one_right_hand_side_is(n):
+    rng = np.random.default_rng(n)
+    A, x = rng.normal(size=(n, n)), rng.normal(size=(n, LANES))
+    lu, pivot = A.copy(), np.zeros(n, dtype=np.int64)
+    assert dense.factorise(lu, n, pivot)
+    expected = np.linalg.solve(A, x)
+    dense.solve_lanes(lu, n, pivot, x)
+    np.testing.assert_allclose(
+        x, expected, atol=100 * np.finfo(float).eps * (np.linalg.cond(A) if n else 1) * abs(expected).max(initial=1)
+    )

@@ -124,10 +124,11 @@ def test_kernel_is_kept_in_the_folder_and_other_packages_keep_theirs(tmp_path, m
 
 
 @compiled
-def test_setting_is_restored_where_decorating_fails(monkeypatch):
+@pytest.mark.parametrize("decorator", [jit.kernel, jit.summing_kernel])
+def test_setting_is_restored_where_decorating_fails(monkeypatch, decorator):
     monkeypatch.setattr(numba.config, "CACHE_DIR", "theirs")
     with pytest.raises(TypeError):
-        jit.kernel("not a function")
+        decorator("not a function")
     assert numba.config.CACHE_DIR == "theirs"
 
 
@@ -135,6 +136,45 @@ def test_flags_keep_nan_infinity_and_the_order_of_sums():
     assert jit.FLAGS["fastmath"] == {"contract"}
     assert jit.FLAGS["nogil"]
     assert "parallel" not in jit.FLAGS
+
+
+def test_sums_of_summing_kernels_may_be_reordered_and_nothing_else():
+    """NaN and infinity keep their meaning there too, and signed zeros and divisions theirs."""
+    assert {"contract", "reassoc"} == jit.SUMMING
+    assert jit.FLAGS["fastmath"] == {"contract"}  # those of plain kernels are not touched by them
+
+
+def test_key_changes_with_what_summing_kernels_may_do(monkeypatch):
+    before = jit._key()
+    monkeypatch.setattr(jit, "SUMMING", {"contract"})
+    assert jit._key() != before
+
+
+def total(x):
+    result = 0.0
+    for i in range(x.shape[0]):
+        result += x[i]
+    return result
+
+
+@compiled
+def test_summing_kernel_sums_within_rounding_the_same_every_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(jit, "_DIRECTORY", str(tmp_path))
+    summing = jit.summing_kernel(total)
+    x = np.random.default_rng(1).normal(size=1001)
+    # any order of n additions is off by n eps of the sum of magnitudes at most
+    assert summing(x) == pytest.approx(total(x), abs=1001 * 2.2e-16 * abs(x).sum())
+    assert len({summing(x) for _ in range(5)}) == 1
+    assert np.isnan(summing(np.array([1.0, np.nan, 2.0])))
+    assert summing(np.array([1.0, np.inf, 2.0])) == np.inf
+    assert list(tmp_path.rglob("*total*.nbi"))
+
+
+@compiled
+def test_plain_kernel_sums_in_the_order_that_is_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(jit, "_DIRECTORY", str(tmp_path))
+    x = np.random.default_rng(1).normal(size=1001)
+    assert jit.kernel(total)(x) == total(x)
 
 
 def divide(x, y):
@@ -152,7 +192,10 @@ def test_compiled_division_by_zero_is_infinity_or_nan():
 def test_sample_of_the_suite_passes_without_compilation():
     """The same tests on the same kernels as plain Python, where coverage sees them and indices are checked."""
     here = Path(__file__).parent
-    sample = [str(here / f"test_{name}.py") for name in ("joint", "dense", "sparse", "contact", "march")]
+    sample = [
+        str(here / f"test_{name}.py")
+        for name in ("joint", "dense", "sparse", "panels", "change", "contact", "march", "observe", "triangle")
+    ]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-p", "no:xdist", "-p", "no:cacheprovider", *sample]
     result = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=here.parents[2], check=False)

@@ -6,7 +6,7 @@ import pytest
 from engine import Newmark, Rayleigh
 from engine.kernels import march
 from engine.kernels.jit import LANES
-from engine.kernels.joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, slip_after
+from engine.kernels.joint import slip_after
 from engine.kernels.march import DAMPING, FRICTION, INPUT, JOINT, JOINT_DAMPING, JOINT_ELASTIC, KINETIC, STRAIN
 from engine.kernels.states import Law, workspace
 
@@ -120,8 +120,9 @@ def law(rng):
 
 def a_contact(rng):
     gap, force, damped = rng.normal(size=(3, LANES, 2 * N_POINT))
+    slip, work = rng.normal(size=(2, LANES, N_POINT))
     state = rng.integers(0, 4, (LANES, N_POINT)).astype(np.int8)
-    return march.Contact(gap, force, damped, rng.normal(size=(LANES, N_POINT)), state)
+    return march.Contact(gap, force, damped, slip, work, state)
 
 
 def test_commit_of_joints_moves_slip_and_accounts_for_the_work(rng):
@@ -148,6 +149,8 @@ def test_commit_of_joints_moves_slip_and_accounts_for_the_work(rng):
         expected[FRICTION] = found.force[lane, 1::2] @ (slip - before.slip[lane])
         np.testing.assert_allclose(energy[:, lane], expected, atol=ROUNDING)
         np.testing.assert_array_equal(contact.slip[lane], slip)
+        friction = found.force[lane, 1::2] * (slip - before.slip[lane])
+        np.testing.assert_allclose(contact.work[lane], before.work[lane] + friction, atol=ROUNDING)
         np.testing.assert_allclose(contact.damped[lane], damped, atol=1e-15)  # product and sum may be one operation
         for name in ("gap", "force", "state"):
             np.testing.assert_array_equal(getattr(contact, name)[lane], getattr(found, name)[lane])
@@ -185,15 +188,6 @@ def test_joints_of_every_lane_are_solved(rng, own):
     assert not found.force[N_LANE:].any()
 
 
-def test_fractions_are_shares_of_the_length():
-    state = np.zeros((LANES, 4), np.int8)
-    state[0], state[1] = [OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD], STICK
-    fraction = np.full((2, LANES), np.nan)
-    march.joint_fractions(state, np.array([1.0, 2.0, 3.0, 4.0]), 2, fraction)
-    np.testing.assert_allclose(fraction[:, :2], [[0.1, 0.0], [0.7, 0.0]], rtol=1e-15)
-    assert np.isnan(fraction[:, 2:]).all()
-
-
 def test_audit_keeps_the_worst_imbalance_drift_and_scale(rng):
     account, start = np.zeros((3, LANES)), rng.uniform(0, 1, (2, LANES))
     energies = rng.normal(size=(4, 8, LANES))
@@ -208,33 +202,3 @@ def test_audit_keeps_the_worst_imbalance_drift_and_scale(rng):
     terms = sum(abs(part) for part in parts) + abs(strain)
     expected = [abs(imbalance).max(axis=0), abs(drift).max(axis=0), terms.max(axis=0)]
     np.testing.assert_allclose(account, expected, rtol=1e-14, atol=1e-15)  # sums of five numbers of order one
-
-
-def test_peaks_are_of_magnitude_total_and_minus_static(rng):
-    history, standing = rng.normal(size=(20, 3, LANES)), rng.normal(size=(3, LANES))
-    peaks, holder, last = np.zeros((2, 3, LANES)), np.zeros(LANES, dtype=bool), np.zeros(LANES, dtype=int)
-    for i, values in enumerate(history):
-        march.observe(values, standing, peaks, 1, holder)
-        last[holder] = i
-    np.testing.assert_array_equal(peaks[0], abs(history).max(axis=0))
-    np.testing.assert_array_equal(peaks[1], abs(history - standing).max(axis=0))
-    np.testing.assert_array_equal(last, abs(history[:, 1]).argmax(axis=0))
-
-
-def test_peaks_of_joints_and_first_slip(rng):
-    """A closed point has slid once its slip has left the elastic range round that before the shaking."""
-    area, before, elastic = rng.uniform(1, 2, N_POINT), *rng.uniform(0, 1, (2, LANES, N_POINT))
-    contacts = [a_contact(rng) for _ in range(8)]
-    elastic[0, 0] = np.inf  # one point that never slides
-    peaks, first = np.zeros((4, LANES, N_POINT)), np.full((LANES, N_POINT), np.nan)
-    for i, contact in enumerate(contacts):
-        march.observe_joints(contact, area, N_LANE, 0.5 * i, before, elastic, peaks, first)
-    gap, force, slip, state = (np.array([getattr(c, name) for c in contacts]) for name in ("gap", "force", "slip", "state"))
-    expected = [gap[..., ::2], abs(slip), -force[..., ::2] / area, -gap[..., ::2]]
-    for row, values in enumerate(expected):
-        np.testing.assert_array_equal(peaks[row, :N_LANE], np.maximum(values.max(axis=0), 0.0)[:N_LANE])
-    slid = (state != OPEN) & (abs(slip - before) > elastic)
-    time = np.where(slid.any(axis=0), 0.5 * slid.argmax(axis=0), np.nan)
-    np.testing.assert_array_equal(first[:N_LANE], time[:N_LANE])
-    assert np.isnan(first[0, 0])
-    assert not peaks[:, N_LANE:].any()
