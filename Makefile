@@ -11,13 +11,14 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 STUDY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help install study test verify check check-platforms clean
+.PHONY: help install study test verify figures check check-platforms clean
 
 help: ## list the targets
 	@echo "make study              run all named studies, from nothing; results and figures in results/"
 	@echo "make study STUDY=p0     run one of them, or a study file"
 	@echo "make test               run the tests"
 	@echo "make verify             run the verification cases alone, with their names"
+	@echo "make figures            draw the figures of docs/ anew, some minutes"
 	@echo "make check              style, format, import contract, types"
 	@echo "make check-platforms    do the pinned versions have wheels on every platform and Python? installs nothing"
 	@echo "make install            make .venv with the command $(BIN)/coralquake"
@@ -49,6 +50,10 @@ test: .venv/tools
 
 verify: .venv/tools
 	$(BIN)/python -m pytest tests/verification --verbose
+
+figures: .venv/installed
+	$(BIN)/python docs/signs.py
+	$(BIN)/python docs/mesh_convergence.py
 
 check: .venv/tools
 	$(BIN)/ruff check .
