@@ -161,6 +161,21 @@ def test_reference_box_is_about_as_flexible_as_a_frame_of_beams():
     assert 107.9 / (1 + 4 * 0.5 / 3.5) < found < 107.9
 
 
+def test_recommended_mesh_is_within_one_percent_of_its_limit():
+    """Of the racking modulus, extrapolated by Aitken from the default mesh and two whose elements are halved and halved again."""
+    moduli = [racking_modulus(box_mesh(spec).mesh, spec) for spec in (Spec(mesh=halved(MeshOptions(), n)) for n in (1, 2, 4))]
+    first, second = np.diff(moduli)
+    assert first < second < 0
+    limit = moduli[2] + second**2 / (first - second)
+    assert limit < moduli[0] < 1.01 * limit
+
+
+def halved(mesh: MeshOptions, n: int) -> MeshOptions:
+    """The mesh with elements n times as small in the structure; far from it the ground's do not matter here."""
+    elements = {name: n * getattr(mesh, name) for name in ("wall_elements", "roof_elements", "side_elements")}
+    return mesh.model_copy(update=elements | {"corner_growth": 1 + (mesh.corner_growth - 1) / n})
+
+
 # The structure alone
 
 
