@@ -155,5 +155,10 @@ def _bending(cases: xr.Dataset, axes: list[str]) -> list[str]:
         return []
     moment, section, axial, time = largest_moment(cases)
     i = int(np.abs(moment).argmax())
-    value = f"{in_words(1e-3 * moment[i], 'kNm/m')} ({section[i]}, {time[i]:.2f} s, N = {in_words(1e-3 * axial[i], 'kN/m')})"
+    value = f"{_in_kilo(moment[i])} kNm/m ({section[i]}, {time[i]:.2f} s, N = {_in_kilo(axial[i])} kN/m)"
     return [f"The largest bending moment is {value}{_at(cases, axes, i)}."]
+
+
+def _in_kilo(value: float) -> str:
+    """A thousandth of a value: '-1,190', '12.3'."""
+    return f"{1e-3 * value:,.0f}" if abs(value) >= 1e6 else f"{1e-3 * value:.3g}"

@@ -19,7 +19,7 @@ NaN and infinity keep their meaning."""
 
 SUMMING = {"contract", "reassoc"}
 """For kernels of one lane whose long sums would wait for every addition: partial sums run side by side, in an order that the
-compiled code fixes. It takes a third off a joint solve of 250 unknowns."""
+compiled code fixes."""
 
 
 def _key() -> str:

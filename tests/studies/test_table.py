@@ -287,7 +287,7 @@ def test_a_single_ratio_is_told_once(ds):
 def told_of(case, place=""):
     """The sentence about the largest bending moment of a case; forces in kN."""
     found = worst(case, 0)
-    moment, axial = (in_words(1e-3 * float(found[f"extreme_{name}"]), "") for name in ("bending_moment", "axial_force"))
+    moment, axial = (f"{1e-3 * float(found[f'extreme_{name}']):,.0f}" for name in ("bending_moment", "axial_force"))
     section, time = str(found["section"].values), float(found["extreme_time"])
     return f"The largest bending moment is {moment} kNm/m ({section}, {time:.2f} s, N = {axial} kN/m){place}."
 
@@ -304,7 +304,7 @@ def test_a_moment_of_either_sign_may_be_the_largest(sign, ds):
     for name, value in {"bending_moment": sign * 1.234e9, "axial_force": -5.67e5}.items():
         ds[f"extreme_{name}"][at] = value
     ds["extreme_time"][at] = 0.12
-    moment = "1.23e+06" if sign > 0 else "-1.23e+06"
+    moment = "1,234,000" if sign > 0 else "-1,234,000"
     assert sentences(ds)[3] == (
         f"The largest bending moment is {moment} kNm/m (roof middle, 0.12 s, N = -567 kN/m) at p0 = 0.283 MPa."
     )
