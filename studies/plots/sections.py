@@ -27,7 +27,7 @@ def sections_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     for top, bottom, member in zip(panels[0], panels[-1], MEMBERS, strict=True):
         top.set_title(member)
         bottom.set_xlabel("from below [m]" if "wall" in member else "from the left [m]")
-    _legend(fig, panels[0, 0])
+    _legend(fig, panels[0, 0], "line: before the shaking, band: what the shaking makes of it")
     return fig
 
 
@@ -69,13 +69,13 @@ def interaction_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
         for draw in (ax.axhline, ax.axvline):
             draw(0, color="0.6", lw=0.5, zorder=0)
     panels[0].set_ylabel(LABELS["N"].replace("\n", " "))
-    _legend(fig, panels[0])
+    _legend(fig, panels[0], "dots: in time, marks: at the extremes of N and of M")
     return fig
 
 
 _GROUPS = {"roof": ["roof"], "walls": ["left wall", "right wall"], "floor": ["floor"]}
 
 
-def _legend(fig: Figure, ax: Axes) -> None:
+def _legend(fig: Figure, ax: Axes, title: str) -> None:
     handles, names = ax.get_legend_handles_labels()
-    fig.legend(handles, names, loc="outside upper center", ncols=min(len(names), 3), columnspacing=1.0)
+    fig.legend(handles, names, title=title, loc="outside upper center", ncols=min(len(names), 3), columnspacing=1.0)
