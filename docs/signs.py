@@ -36,9 +36,8 @@ def box(ax: Axes) -> None:
         start = member.start - centre
         end = start + member.span * member.along
         arrow(ax, tuple(start), tuple(end), GREY)
-        middle, inward = (start + end) / 2, np.array([-member.along[1], member.along[0]])
         rotation = 0 if member.along[0] else 90
-        ax.text(*(middle + 0.55 * inward), f"{member.name}, s", ha="center", va="center", rotation=rotation)
+        ax.text(*((start + end) / 2 + 0.55 * member.inward), f"{member.name}, s", ha="center", va="center", rotation=rotation)
     ax.text(0, 0, "inside", ha="center", va="center", style="italic")
     ax.text(0, half[1] + 0.25, "ground", ha="center", va="bottom", style="italic")
     ax.set(xlim=(-3.1, 3.1), ylim=(-2.6, 2.9), aspect="equal")

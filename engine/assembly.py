@@ -183,12 +183,12 @@ def build_system(
         raise MeshError(f"material: names {mesh.material.max()}, there are {len(materials)} materials")
     if len(mesh.joint_material) and mesh.joint_material.max() >= len(joint_materials):
         raise MeshError(f"joint_material: names {mesh.joint_material.max()}, there are {len(joint_materials)} joint materials")
-    held = constraints or Constraints.free(mesh)
-    points = joint_points(mesh, quadrature, thickness)
     if lumped and mesh.order == 2:
         raise MeshError("lumped: six-node triangles have no lumped mass, their row sums leave the corners without any")
     if quadrature == "one-point" and mesh.order == 2:
         raise MeshError("quadrature: one point cannot hold a joint of six nodes; take nodal")
+    held = constraints or Constraints.free(mesh)
+    points = joint_points(mesh, quadrature, thickness)
     stiffness, mass = element_matrices(solids_of(mesh, materials, thickness), lumped)
     expand, n_interior = _numbering(mesh, points, held)
     full_stiffness, full_mass = (scatter(len(mesh.nodes), mesh.triangles, blocks) for blocks in (stiffness, mass))

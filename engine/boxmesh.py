@@ -12,7 +12,7 @@ from math import ceil, exp, log
 import numpy as np
 
 from .bisection import refined
-from .mesh import SIDES, Flags, Floats, Ints, Mesh
+from .mesh import SIDES, Flags, Floats, Ints, Mesh, compacted
 from .spec import Box, Layer, MeshOptions, Spec
 from .walls import with_sections
 
@@ -91,14 +91,12 @@ def box_mesh(spec: Spec) -> BoxMesh:
     outline, outside = _outline(grid, nodes, triangles, material, solid)
     n = len(nodes)
     numbered = triangles + n * solid[:, None]  # the structure's nodes after the ground's: on the outline there are two of each
-    used, renumbered = np.unique(numbered, return_inverse=True)
-    new = np.full(2 * n, -1)
-    new[used] = np.arange(len(used))
+    used, renumbered, new = compacted(numbered, 2 * n)
     joints = np.column_stack([outline, outline[:, ::-1] + n])[outside >= 0]
     groups, joint_material = _joint_groups(nodes[joints[:, 0]], nodes[joints[:, 1]], outside[outside >= 0], spec)
     mesh = Mesh(
         nodes=nodes[used % n],
-        triangles=renumbered.reshape(-1, 3),
+        triangles=renumbered,
         material=material,
         joints=new[joints],
         joint_material=joint_material,

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from .assembly import Constraints, Material, build_system, pressure_forces
-from .mesh import Mesh
+from .mesh import Mesh, compacted
 from .recorder import racking_operator
 from .spec import Spec
 
@@ -35,12 +35,10 @@ def racking_modulus(mesh: Mesh, spec: Spec) -> float:
 def structure_of(mesh: Mesh) -> Mesh:
     """The structure by itself, with its pressure edges, corners and sections."""
     chosen = mesh.triangles[mesh.structure]
-    used, triangles = np.unique(chosen, return_inverse=True)
-    new = np.full(len(mesh.nodes), -1)
-    new[used] = np.arange(len(used))
+    used, triangles, new = compacted(chosen, len(mesh.nodes))
     return Mesh(
         nodes=mesh.nodes[used],
-        triangles=triangles.reshape(chosen.shape),
+        triangles=triangles,
         material=np.zeros(len(chosen), dtype=np.int64),
         pressure_edges=new[mesh.pressure_edges],
         corners=new[mesh.corners],

@@ -49,7 +49,7 @@ class Section:
     @property
     def inward(self) -> Floats:
         """Unit vector along the cut, towards the inner face."""
-        return np.array([-self.along[1], self.along[0]])
+        return to_the_left(self.along)
 
     def behind(self, places: Floats) -> Flags:
         """(…,) True for places (…, 2) behind the cut."""
@@ -148,6 +148,11 @@ class Mesh:
         """
         _require(self.order == 1, "triangles: have six nodes already")
         return _raised(self, place or (lambda ends: ends.mean(axis=1)))
+
+
+def to_the_left(along: Floats) -> Floats:
+    """A vector (2,) turned by 90°, counter-clockwise."""
+    return np.array([-along[1], along[0]])
 
 
 SIDES = ((0, 1), (1, 2), (2, 0))
@@ -325,6 +330,14 @@ def _check_sections(mesh: Mesh) -> None:
 def are_sides(pairs: Ints, sides: Ints) -> bool:
     """Whether all pairs (n, 2) of nodes are among the sides, which are numbered as in `Mesh.sides`."""
     return bool(np.isin(_numbered(pairs), sides).all())
+
+
+def compacted(triangles: Ints, n_node: int) -> tuple[Ints, Ints, Ints]:
+    """The nodes that triangles use, the triangles by their places among these, and every node's place, -1 where it is unused."""
+    used = np.unique(triangles)
+    place = np.full(n_node, -1)
+    place[used] = np.arange(len(used))
+    return used, place[triangles], place
 
 
 def _numbered(pairs: Ints) -> Ints:

@@ -136,4 +136,5 @@ def simulate_cases(
         static[0][:, lane], static[1][:, lane] = pair
     stepper = Stepper(model.system, newmark_of(model.spec), model.rayleigh)
     every = model.spec.output.every
-    return simulate(stepper, lanes, static, model.frequencies[0], every=every, progress=progress, trace=trace)
+    first = model.frequencies[0]
+    return simulate(stepper, lanes, static, first, every=every, progress=progress, trace=trace, sections=model.sections)

@@ -12,6 +12,7 @@ from .kernels.march import JOINT_ELASTIC, STRAIN, audit
 from .mesh import Flags, Floats
 from .newmark import Stepper, StepReport
 from .recorder import Recorder
+from .sections import SectionForces
 from .state import Lanes, State
 from .static import equilibrium
 from .watch import JointWatch, SectionWatch, ValueWatch
@@ -115,14 +116,15 @@ def simulate(
     throw: bool = False,
     progress: Callable[[int], None] | None = None,
     trace: Callable[[Trace], None] | None = None,
+    sections: SectionForces | None = None,
 ) -> Response:
     """March all lanes from their equilibrium under `static_loads` (n_dof, LANES) to the end of their motions.
 
     Histories keep every `every`-th step, peaks see all. `throw` raises ConvergenceError for the first failed lane; otherwise
     failure is a status. `progress` is called with the number of steps done, every hundred; `trace` with every step
-    that the first lane survives.
+    that the first lane survives. `sections` are the section forces of the stepper's system, where the caller has them already.
     """
-    run = _Run(stepper, lanes, every)
+    run = _Run(stepper, lanes, every, sections or SectionForces.of(stepper.system))
     run.settle(static_loads, first_frequency)
     if trace is not None and run.alive[0]:
         trace(run.traced(0))
@@ -144,7 +146,7 @@ def simulate(
 class _Run:
     """A march and its account."""
 
-    def __init__(self, stepper: Stepper, lanes: Lanes, every: int) -> None:
+    def __init__(self, stepper: Stepper, lanes: Lanes, every: int, sections: SectionForces) -> None:
         self.stepper, self.every = stepper, every
         self.lanes = replace(lanes, standing=lanes.standing.copy(), ground=lanes.ground.copy())
         self.system: System = stepper.system
@@ -152,7 +154,7 @@ class _Run:
         self.state = State.at_rest(self.system)
         self.values = ValueWatch(self.system, self.n_kept)
         self.joints = JointWatch(self.system, lanes, self.n_kept)
-        self.sections = SectionWatch(self.system, stepper.rayleigh, lanes, self.n_kept)
+        self.sections = SectionWatch(sections, stepper.rayleigh, lanes, self.n_kept)
         self.iterations: Floats = np.zeros(LANES)
         self.residual: Floats = np.zeros(LANES)
         self.source_test: Floats = np.zeros(LANES)

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from .mesh import Floats, Ints, Mesh, Section, are_sides, neighbours
+from .mesh import Floats, Ints, Mesh, Section, are_sides, neighbours, to_the_left
 from .spec import Box
 
 MIDDLE = "middle"
@@ -25,6 +25,11 @@ class Member:
     along: Floats
     span: float
     ends: tuple[str, str]
+
+    @property
+    def inward(self) -> Floats:
+        """Unit vector across the member, towards its inner face."""
+        return to_the_left(self.along)
 
     @property
     def forwards(self) -> bool:
@@ -76,8 +81,7 @@ def _distance(wanted: float, middle: float, s: float) -> tuple[float, float]:
 def _lines(mesh: Mesh, member: Member, wall: float, sides: Ints) -> dict[float, Section]:
     """Distance from the member's start -> section, for every line along element sides from face to face in its clear span."""
     nodes = np.unique(mesh.triangles[mesh.structure][:, :3])
-    along, inward = member.along, np.array([-member.along[1], member.along[0]])
-    s, height = (mesh.nodes[nodes] - member.start) @ along, (mesh.nodes[nodes] - member.start) @ inward
+    s, height = ((mesh.nodes[nodes] - member.start) @ direction for direction in (member.along, member.inward))
     near = 1e-9 * max(member.span, wall)
     inside = np.flatnonzero((np.abs(height) <= wall / 2 + near) & (s >= -near) & (s <= member.span + near))
     inside = inside[np.lexsort([height[inside], s[inside]])]
@@ -85,6 +89,6 @@ def _lines(mesh: Mesh, member: Member, wall: float, sides: Ints) -> dict[float, 
     for line in np.split(inside, np.flatnonzero(np.diff(s[inside]) > near) + 1):
         across = np.ptp(height[line]) >= wall - near
         if across and are_sides(neighbours(nodes[line]), sides):
-            centre = member.start + s[line[0]] * along
-            found[float(s[line[0]])] = Section(float(centre[0]), float(centre[1]), nodes[line], along)
+            centre = member.start + s[line[0]] * member.along
+            found[float(s[line[0]])] = Section(float(centre[0]), float(centre[1]), nodes[line], member.along)
     return found

@@ -146,9 +146,9 @@ class JointWatch:
 class SectionWatch:
     """N, Q and M of all sections, with their extremes."""
 
-    def __init__(self, system: System, rayleigh: Rayleigh, lanes: Lanes, n_kept: int) -> None:
-        self.forces, self.rayleigh = SectionForces.of(system), rayleigh
-        n = len(system.mesh.sections)
+    def __init__(self, forces: SectionForces, rayleigh: Rayleigh, lanes: Lanes, n_kept: int) -> None:
+        self.forces, self.rayleigh = forces, rayleigh
+        n = len(forces.system.mesh.sections)
         self.loads: Floats = lanes.behind_sections if len(lanes.behind_sections) else np.zeros((3 * n, LANES))
         if not len(lanes.behind_sections) and lanes.standing[self.forces.dofs].any():
             raise ValueError("behind_sections: must be given, the standing loads act on nodes of sections")

@@ -20,7 +20,7 @@ from .convergence import convergence_figure
 from .motion import history_figure, record_figure
 from .racking import racking_figure
 from .sections import interaction_figure, sections_figure
-from .style import LABEL_WIDTH, STYLE, in_lines, symbol
+from .style import LABEL_WIDTH, STYLE, in_lines, only_axis_of_numbers, symbol
 from .sweeps import GRID_QUANTITIES, grid_figure, peaks_figure
 
 __all__ = ["draw_all"]
@@ -50,8 +50,8 @@ def draw_all(ds: xr.Dataset, path: Path) -> list[Path]:
         if len(axes) > 1 and all(ds[axis].dtype.kind in "fi" for axis in axes):
             for quantity in GRID_QUANTITIES:
                 drawings[f"sweep-{quantity}"] = partial(grid_figure, ds, quantity)
-        if len(axes) == 1 and done[axes[0]].dtype.kind in "fi" and done.sizes["case"] > 2:
-            drawings["peaks"] = lambda: peaks_figure(done, axes[0])
+        if axis := only_axis_of_numbers(done, axes):
+            drawings["peaks"] = partial(peaks_figure, done, axis)
         if is_domain_size(ds):
             drawings["convergence"] = lambda: convergence_figure(ds)
     files = []

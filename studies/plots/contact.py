@@ -19,9 +19,7 @@ def contact_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     colours = ListedColormap([JOINT_COLOURS[name] for name in ("open", "sticking", "slipping")])
     panels = fig.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for ax, (i, name) in zip(panels, shown.items(), strict=True):
-        case = cases.isel(case=i)
-        case = case.isel(joint=np.argsort(case["joint_arc"].values, kind="stable"))
-        case = case.isel(joint=np.flatnonzero(np.isfinite(case["joint_arc"].values)))
+        case = _round_the_box(cases.isel(case=i))
         states = np.minimum(case["joint_state"].transpose("joint", "time").values, 2)
         edges = np.concatenate([[0.0], np.cumsum(case["joint_length"].values)])
         time = case["time"].values
@@ -36,14 +34,20 @@ def contact_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     return fig
 
 
+def _round_the_box(case: xr.Dataset) -> xr.Dataset:
+    """The joint points of one case by arc length, without those that a sweep of meshes pads with."""
+    arc = case["joint_arc"].values
+    there = np.flatnonzero(np.isfinite(arc))
+    return case.isel(joint=there[np.argsort(arc[there], kind="stable")])
+
+
 def joint_figure(cases: xr.Dataset, shown: dict[int, str]) -> Figure:
     """Round the box the contact pressure (before shaking, and largest), opening and slip; in time what is open and slips."""
     fig = Figure(figsize=(WIDTH, 5.6))
     panels = fig.subplots(3, 2, sharex="col", width_ratios=(1.5, 1))
     for (i, name), (colour, dash) in zip(shown.items(), LINES, strict=False):
         case = cases.isel(case=i)
-        there = np.flatnonzero(np.isfinite(case["joint_arc"].values))
-        part = case.isel(joint=there[np.argsort(case["joint_arc"].values[there], kind="stable")])
+        part = _round_the_box(case)
         style = {"color": colour, "ls": dash}
         before = 1e-6 * part["joint_pressure"].isel(time=0)
         panels[0, 0].plot(part["joint_arc"], before, color=colour, ls=dash, lw=0.5, marker=".", markersize=2)
@@ -80,10 +84,10 @@ _JOINT_LABELS = (
 
 def _mark_sides(panels: np.ndarray, case: xr.Dataset) -> None:
     """Corners as lines, the names of the sides over the first panel."""
-    case = case.isel(joint=np.flatnonzero(np.isfinite(case["joint_arc"].values)))
-    sides, arc, length = (case[name].values for name in ("joint_side", "joint_arc", "joint_length"))
+    case = _round_the_box(case)
+    sides, length = case["joint_side"].values, case["joint_length"].values
     end = 0.0
-    for side in dict.fromkeys(sides[np.argsort(arc, kind="stable")]):
+    for side in dict.fromkeys(sides):
         start, end = end, end + float(length[sides == side].sum())
         panels[0].text((start + end) / 2, 1.02, side, transform=panels[0].get_xaxis_transform(), ha="center")
         for ax in panels:

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from .style import LINES, WIDTH, axis_unit, scale_x, symbol
+from .style import LINES, WIDTH, axis_label, axis_unit, only_axis_of_numbers, scale_x
 
 SCATTER = 0.2
 """The curves hold to about so much; they are for one ground all round, without slip and lift-off."""
@@ -33,13 +33,11 @@ def racking_figure(cases: xr.Dataset, axes: list[str]) -> Figure:
     left, right = fig.subplots(1, 2)
     _on_the_curves(left, cases)
     fig.legend(*left.get_legend_handles_labels(), title=TITLE, loc="outside upper center", ncols=5, columnspacing=1.0)
-    if len(axes) == 1 and cases[axes[0]].dtype.kind in "fi" and cases.sizes["case"] > 2:
-        unit, factor = axis_unit(cases[axes[0]].attrs["units"])
-        right.plot(factor * cases[axes[0]], cases["racking_ratio"], color="black", marker="o", markersize=3)
-        scale_x(right, factor * cases[axes[0]].values)
-        right.set(
-            xlabel=f"{symbol(axes[0])} [{unit}]" if unit != "1" else symbol(axes[0]), ylabel="racking ratio R", ylim=(0, None)
-        )
+    if axis := only_axis_of_numbers(cases, axes):
+        unit, factor = axis_unit(cases[axis].attrs["units"])
+        right.plot(factor * cases[axis], cases["racking_ratio"], color="black", marker="o", markersize=3)
+        scale_x(right, factor * cases[axis].values)
+        right.set(xlabel=axis_label(axis, unit), ylabel="racking ratio R", ylim=(0, None))
     else:
         case = cases.isel(case=0)
         racking = 1e3 * (case["racking_shear"] - case["racking_shear"].isel(time=0))

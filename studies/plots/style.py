@@ -74,6 +74,17 @@ def axis_unit(unit: str) -> tuple[str, float]:
     return ("MPa", 1e-6) if unit == "Pa" else (unit, 1.0)
 
 
+def axis_label(axis: str, unit: str) -> str:
+    """'damping ratio', 'width [m]'."""
+    return f"{symbol(axis)} [{unit}]" if unit != "1" else symbol(axis)
+
+
+def only_axis_of_numbers(cases: xr.Dataset, axes: list[str]) -> str:
+    """The axis that curves are drawn along: the only one, of numbers, with more than two cases; nothing where there is none."""
+    drawable = len(axes) == 1 and cases[axes[0]].dtype.kind in "fi" and cases.sizes["case"] > 2
+    return axes[0] if drawable else ""
+
+
 def point_in_words(ds: xr.Dataset, axis: str, i: int, width: int) -> str:
     """One value of an axis in words, in lines of `width` characters: 'scale = 2'."""
     return in_lines([symbol(axis), f"= {in_words(ds[axis].values[i], ds[axis].attrs['units'])}"], width, between=" ")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..messages import in_words
 from ..table import axes_of
-from .style import LINES, MANY_LINES, WIDTH, axis_unit, in_lines, log_ticks, point_in_words, scale_x, symbol
+from .style import LINES, MANY_LINES, WIDTH, axis_label, axis_unit, in_lines, log_ticks, point_in_words, scale_x, symbol
 
 GRID_QUANTITIES: dict[str, tuple[str, Callable[[xr.Dataset], xr.DataArray]]] = {
     "racking": ("peak racking [mm]", lambda ds: 1e3 * ds["peak_racking"]),
@@ -60,7 +60,7 @@ def grid_figure(ds: xr.Dataset, quantity: str) -> Figure:
         log_ticks(panels[0, 0].yaxis, values, most=6)
     unit, _ = axis_unit(ds[x].attrs["units"])
     fixed = in_lines([f"{symbol(axis)} = {in_words(ds[axis].values, ds[axis].attrs['units'])}" for axis in middle], LINE)
-    below = f"{symbol(x)} [{unit}]" if unit != "1" else symbol(x)
+    below = axis_label(x, unit)
     fig.supxlabel(f"{below}\n{fixed}" if fixed else below, fontsize=8)
     fig.supylabel(label, fontsize=8)
     names = [in_words(value, ds[curves].attrs["units"]) for value in ds[curves].values]
@@ -104,7 +104,7 @@ def peaks_figure(cases: xr.Dataset, axis: str) -> Figure:
             ax.plot(x, values, color=colour, ls=dash, marker=marker, markersize=3, label=name, clip_on=False)
         scale_x(ax, x)
         ax.set_ylim(0, 100 if "%" in label else None)
-        ax.set(ylabel=label, xlabel=f"{symbol(axis)} [{unit}]" if unit != "1" else symbol(axis))
+        ax.set(ylabel=label, xlabel=axis_label(axis, unit))
         if len(curves) > 1:
             ax.legend()
     return fig

@@ -325,7 +325,7 @@ def shaken(request):
     assert found[0]
     stepper = Stepper(system, newmark_of(spec), model.rayleigh)
     stepper.start(state, lanes, lanes.ground[0])
-    watch = SectionWatch(system, model.rayleigh, lanes, 1)
+    watch = SectionWatch(SectionForces.of(system), model.rayleigh, lanes, 1)
     seen = []
     for step in range(1, 26):
         assert not stepper.step(state, lanes, lanes.ground[step - 1], lanes.ground[step]).failed[0]

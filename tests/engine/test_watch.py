@@ -161,7 +161,7 @@ def test_friction_takes_energy_on_the_whole(response):
 
 
 def test_histories_of_sections_are_those_of_a_march_by_hand(system, lanes, response, by_hand):
-    watch = SectionWatch(system, RAYLEIGH, lanes, 1)
+    watch = SectionWatch(SectionForces.of(system), RAYLEIGH, lanes, 1)
     expected = []
     for step, state in enumerate(by_hand):
         watch.see(DT * step, state, lanes.ground[step])
@@ -202,7 +202,11 @@ def test_extremes_at_rest_are_the_static_forces(system, lanes):
 
 
 def test_watches_start_with_nothing_seen(system, lanes):
-    values, joints, sections = ValueWatch(system, 3), JointWatch(system, lanes, 3), SectionWatch(system, RAYLEIGH, lanes, 3)
+    values, joints, sections = (
+        ValueWatch(system, 3),
+        JointWatch(system, lanes, 3),
+        SectionWatch(SectionForces.of(system), RAYLEIGH, lanes, 3),
+    )
     joints.begin(State.at_rest(system))
     assert np.isnan(values.found()["values"]).all()
     assert (values.found()["principal_extremes"][:, 0] == -np.inf).all()
