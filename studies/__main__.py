@@ -173,7 +173,7 @@ def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tupl
     if not fresh and path.is_file() and (ds := _finished(study, path)) is not None:
         return ds, 0.0
     start = time.perf_counter()
-    total = sum(round(spec.time.duration / spec.time.dt) for spec in study.cases)
+    total = study.case_steps
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -211,8 +211,9 @@ def _finished(study: Study, path: Path) -> xr.Dataset | None:
 def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
     out.print()
     out.print(Text(study.title, style="bold"))
-    for sentence in sentences(ds):
-        out.print(sentence, markup=False)
+    for sentence in [study.scaling.sentence, *sentences(ds)]:
+        if sentence:
+            out.print(sentence, markup=False)
     if is_domain_size(ds):
         for sentence in [*convergence_sentences(ds), source_sentence(ds)]:
             out.print(sentence, markup=False)
@@ -249,6 +250,8 @@ def check(study: StudyName, workers: Workers = None) -> None:
     width = max(len(name) for name, _ in advice.facts)
     for name, value in advice.facts:
         out.print(f"{name:<{width}}  {value}", markup=False, soft_wrap=True)
+    if said := loaded.scaling.sentence:
+        out.print(said, markup=False, soft_wrap=True)
     for warning in advice.warnings:
         out.print(f"warning: {warning}", markup=False, soft_wrap=True)
 

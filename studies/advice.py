@@ -52,10 +52,9 @@ def _facts(study: Study, model: Model, workers: int) -> list[tuple[str, str]]:
     firsts = [study.cases[batch.cases[0]] for batch in study.batches]
     sizes = [_size_of(spec) for spec in firsts]
     structure, joints, ground, unknowns = ([getattr(size, field.name) for size in sizes] for field in fields(_Size)[:4])
-    steps = sum(_steps(spec) for spec in study.cases)
     batches = "1 batch" if len(study.batches) == 1 else f"{len(study.batches)} batches"
     return [
-        ("cases", f"{len(study.cases)} in {batches}, {steps:,} case-steps, about {_seconds(study, workers):.0f} s"),
+        ("cases", f"{len(study.cases)} in {batches}, {study.case_steps:,} case-steps, about {_seconds(study, workers):.0f} s"),
         ("axes", ", ".join(f"{axis.name} ({len(axis.values)})" for axis in study.axes) or "none"),
         ("mesh", f"{_range(structure)} structure + {_range(joints)} joint + {_range(ground)} ground elements"),
         ("unknowns", f"{_range(unknowns)} degrees of freedom, {len(model.system.points)} joint points"),
@@ -103,10 +102,6 @@ def _size(domain: Domain, box: Box, layers: tuple[Layer, ...], options: MeshOpti
     return _Size(structure, len(mesh.joints), len(mesh.triangles) - structure, int(moves_alone.sum()), highest)
 
 
-def _steps(spec: Spec) -> int:
-    return round(spec.time.duration / spec.time.dt)
-
-
 def _range(counts: list[int]) -> str:
     low, high = min(counts), max(counts)
     return f"{low}" if low == high else f"{low} to {high}"
@@ -122,8 +117,7 @@ def _seconds_a_step(spec: Spec, n_case: int) -> float:
 def _seconds(study: Study, workers: int) -> float:
     """About how long the batches take: as long as the longest of them at least."""
     each = [
-        max(_steps(study.cases[i]) for i in batch.cases) * _seconds_a_step(study.cases[batch.cases[0]], len(batch.cases))
-        for batch in study.batches
+        study.steps(batch.cases[0]) * _seconds_a_step(study.cases[batch.cases[0]], len(batch.cases)) for batch in study.batches
     ]
     return max(1.0, *each, sum(each) / workers)
 

@@ -75,9 +75,9 @@ def _variable(
 
 
 def _typed(variable: Variable, values: Any) -> np.ndarray:
-    """Whole numbers for flags, -1 where there is nothing; floats otherwise."""
+    """Whole numbers for flags, -1 where there is nothing, and for what is counted; floats otherwise."""
     if not variable.flags:
-        return np.asarray(values, dtype=np.float32 if variable.single else np.float64)
+        return np.asarray(values, dtype=np.int32 if variable.whole else np.float32 if variable.single else np.float64)
     found = np.asarray(values, dtype=float)
     return np.where(np.isnan(found), -1, found).astype(np.int8)
 
@@ -125,6 +125,23 @@ def case_arrays(model: Model, response: Response, extra: dict[str, np.ndarray]) 
     }
     found |= _of_points(r) | _of_racking(r, extra) | _of_sections(r) | _of_joints(model, r)
     return found | extra
+
+
+def with_followers(arrays: dict[str, np.ndarray], lane: np.ndarray, factor: np.ndarray) -> dict[str, np.ndarray]:
+    """The arrays of `case_arrays` with further cases behind, each the response of a lane (n,) times a factor (n,) (D13).
+
+    What the schema wants found for every case by itself is left out.
+    """
+    found = {"time": arrays["time"]}
+    for name, values in arrays.items():
+        if name != "time" and (degree := SCHEMA[name].degree) is not None:
+            found[name] = np.concatenate([values, _times(values[lane], factor**degree) if degree else values[lane]])
+    return found
+
+
+def _times(values: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Each of values (n, …) times its factor (n,), in the precision of the values."""
+    return (values * factor.reshape(-1, *[1] * (values.ndim - 1))).astype(values.dtype)
 
 
 def _of_points(r: Response) -> dict[str, np.ndarray]:

@@ -19,6 +19,7 @@ from engine.spec import GENERATED, Motion
 from .axes import Axis, swept_axes
 from .fields import catalogue, nearest
 from .messages import StudyError, explain, in_words, shown
+from .scaling import Scaling, scaling_of
 from .sizes import DomainSizes, domain_axis, read_sizes
 
 SHIPPED = Path(__file__).parent
@@ -32,9 +33,16 @@ MOST_NESTED = 20
 
 @dataclass(frozen=True)
 class Batch:
-    """Cases (positions in Study.cases) that march together: at most LANES, of one model and time step."""
+    """Cases (positions in Study.cases) that march together, at most LANES, of one model and time step; and those that follow
+    from one of them by a factor."""
 
     cases: tuple[int, ...]
+    followers: tuple[int, ...] = ()
+
+    @property
+    def all_cases(self) -> tuple[int, ...]:
+        """Those that march first."""
+        return self.cases + self.followers
 
 
 @dataclass(frozen=True)
@@ -54,6 +62,16 @@ class Study:
         """Number of values along each axis."""
         return tuple(len(axis.values) for axis in self.axes)
 
+    def steps(self, case: int) -> int:
+        """Number of time steps of a case."""
+        time = self.cases[case].time
+        return round(time.duration / time.dt)
+
+    @property
+    def case_steps(self) -> int:
+        """Number of steps of all cases that are solved."""
+        return sum(self.steps(case) for case in self.scaling.solved)
+
     def label(self, case: int) -> str:
         """The case in words: 'p0 = 2 MPa'."""
         index = np.unravel_index(case, self.shape) if self.axes else ()
@@ -65,12 +83,19 @@ class Study:
         return base_motion(self.cases[case], self.motions)
 
     @cached_property
+    def scaling(self) -> Scaling:
+        """Which cases are solved, and how the others follow from them."""
+        return scaling_of(self.cases)
+
+    @cached_property
     def batches(self) -> tuple[Batch, ...]:
-        """Cases grouped by what they share; it depends on the study alone."""
+        """Solved cases grouped by what they share, with those that follow; it depends on the study alone."""
         groups: dict[str, list[int]] = {}
-        for i, spec in enumerate(self.cases):
-            groups.setdefault(_shared(spec), []).append(i)
-        return tuple(Batch(tuple(group[i : i + LANES])) for group in groups.values() for i in range(0, len(group), LANES))
+        for i in self.scaling.solved:
+            groups.setdefault(_shared(self.cases[i]), []).append(i)
+        followers = self.scaling.followers
+        marched = (tuple(group[i : i + LANES]) for group in groups.values() for i in range(0, len(group), LANES))
+        return tuple(Batch(cases, tuple(f for case in cases for f in followers.get(case, ()))) for cases in marched)
 
 
 def _shared(spec: Spec) -> str:

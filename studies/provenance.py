@@ -12,6 +12,7 @@ from .plan import Study
 
 def provenance(study: Study) -> dict[str, str]:
     packages = ("coralquake", "numpy", "numba", "scipy", "xarray", "netCDF4", "pandas")
+    said = f"; {study.scaling.sentence}" if study.scaling.sentence else ""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     records = ", ".join(f"{name} {sha256(m.acceleration.tobytes()).hexdigest()}" for name, m in study.motions.items())
     return {
@@ -25,7 +26,7 @@ def provenance(study: Study) -> dict[str, str]:
         "commit": _commit(),
         "platform": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "created": now,
-        "history": f"{now} computed by coralquake {version('coralquake')}",
+        "history": f"{now} computed by coralquake {version('coralquake')}{said}",
     }
 
 

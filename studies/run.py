@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from multiprocessing import active_children, get_context
 from pathlib import Path
@@ -28,10 +28,10 @@ from engine import (
     simulate_cases,
 )
 
-from .dataset import build_dataset, case_arrays
+from .dataset import build_dataset, case_arrays, with_followers
 from .domain_size import with_convergence
 from .messages import StudyError
-from .plan import Study, load_study
+from .plan import Batch, Study, load_study
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -40,6 +40,34 @@ TRIES_ALONE = 2
 
 Progress = Callable[[int], None]
 """Told how many case-steps have been done since it was last called."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be computed of one batch.
+
+    specs, motions : of all its cases; base accelerations (n_step + 1, 2) [m/s²] as the study gives them
+    n_marched : how many of them march; each further one is the response of a `lane` among these times its `factor`
+    """
+
+    specs: list[Spec]
+    motions: list[np.ndarray]
+    n_marched: int
+    lane: np.ndarray
+    factor: np.ndarray
+
+    @classmethod
+    def of(cls, study: Study, batch: Batch) -> "Job":
+        """The job of a batch of a study."""
+        cases, scaling, followers = batch.all_cases, study.scaling, list(batch.followers)
+        lane = np.array([batch.cases.index(case) for case in scaling.solved_as[followers]], dtype=int)
+        motions = [study.ground(case) for case in cases]
+        return cls([study.cases[case] for case in cases], motions, len(batch.cases), lane, scaling.scaled_by[followers])
+
+    @property
+    def case_steps(self) -> int:
+        """How many steps of cases are marched."""
+        return sum(len(motion) - 1 for motion in self.motions[: self.n_marched])
 
 
 @dataclass(frozen=True)
@@ -77,11 +105,18 @@ def run_study(study: Study, workers: int | None = None, progress: Progress | Non
     found = []
     for b, batch in enumerate(study.batches):
         outcome = outcomes[b]
-        found.append(_emptied(whole, len(batch.cases), outcome) if isinstance(outcome, Lost) else outcome)
-        for lane, case in enumerate(batch.cases):
-            owner[case] = b, lane
+        own = _emptied(whole, len(batch.all_cases), outcome) if isinstance(outcome, Lost) else outcome
+        found.append(replace(own, arrays=own.arrays | _origin(study, batch)))
+        for place, case in enumerate(batch.all_cases):
+            owner[case] = b, place
     ds = build_dataset(study, [each.model for each in found], [each.arrays for each in found], owner)
     return with_convergence(ds, study.sizes) if study.sizes else ds
+
+
+def _origin(study: Study, batch: Batch) -> dict[str, np.ndarray]:
+    """Of which case, counted from 1, each of a batch is a multiple, and by what factor."""
+    cases = list(batch.all_cases)
+    return {"solved_as": study.scaling.solved_as[cases] + 1, "scaled_by": study.scaling.scaled_by[cases]}
 
 
 def _emptied(whole: Outcome, n_case: int, lost: Lost) -> Outcome:
@@ -93,33 +128,27 @@ def _emptied(whole: Outcome, n_case: int, lost: Lost) -> Outcome:
 
 
 def _outcomes(study: Study, workers: int, progress: Progress) -> Iterator[tuple[int, Outcome | Lost]]:
-    jobs = {
-        i: ([study.cases[k] for k in batch.cases], [study.ground(k) for k in batch.cases])
-        for i, batch in enumerate(study.batches)
-    }
+    jobs = {i: Job.of(study, batch) for i, batch in enumerate(study.batches)}
     if min(workers, len(jobs)) == 1:
         for i, job in jobs.items():
-            yield i, _guarded(*job, progress)
+            yield i, _guarded(job, progress)
         return
     compile_kernels()  # once, not in every process
     with _one_thread():
         left = dict(jobs)
         for i, outcome in _in_pool(jobs, min(workers, len(jobs))):
-            progress(sum(len(motion) - 1 for motion in jobs[i][1]))
+            progress(jobs[i].case_steps)
             del left[i]
             yield i, outcome
         for i, job in left.items():  # a worker was lost and took the pool with it: each batch left gets a pool of its own
             yield i, _alone(job)
-            progress(sum(len(motion) - 1 for motion in job[1]))
-
-
-Job = tuple[list[Spec], list[np.ndarray]]
+            progress(job.case_steps)
 
 
 def _in_pool(jobs: dict[int, Job], workers: int) -> Iterator[tuple[int, Outcome | Lost]]:
     """Outcomes as they come; ends early where a worker is lost, which breaks the whole pool."""
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent) as pool:
-        futures = {pool.submit(_guarded, *job): i for i, job in jobs.items()}
+        futures = {pool.submit(_guarded, job): i for i, job in jobs.items()}
         try:
             for future in as_completed(futures):
                 try:
@@ -145,10 +174,10 @@ def _alone(job: Job) -> Outcome | Lost:
     return Lost(Status.WORKER_LOST, f"the process that computed it was lost {1 + TRIES_ALONE} times")
 
 
-def _guarded(specs: list[Spec], motions: list[np.ndarray], progress: Progress | None = None) -> Outcome | Lost:
+def _guarded(job: Job, progress: Progress | None = None) -> Outcome | Lost:
     """`run_batch`, with what stops it told as a reason instead of stopping the other batches."""
     try:
-        return run_batch(specs, motions, progress)
+        return run_batch(job, progress)
     except (MeshError, MemoryError, ArithmeticError, np.linalg.LinAlgError, RuntimeError) as error:
         return Lost(Status.NOT_RUN, f"could not be computed: {error or type(error).__name__}")
 
@@ -168,11 +197,12 @@ def _one_thread() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress | None = None) -> Outcome:
-    """March one batch with its free field, and gather what the dataset holds of it."""
+def run_batch(job: Job, progress: Progress | None = None) -> Outcome:
+    """March one batch with its free field, and gather what the dataset holds of all its cases."""
+    n, specs = job.n_marched, job.specs[: job.n_marched]
     model = build_model(specs[0])
-    depths = [_depth_of_the_record(spec) for spec in specs]
-    motions = _at_the_base(model, motions, depths)
+    depths = [_depth_of_the_record(spec) for spec in job.specs]
+    motions = _at_the_base(model, job.motions, depths)
     told = 0
 
     def tell(step: int) -> None:
@@ -181,24 +211,27 @@ def run_batch(specs: list[Spec], motions: list[np.ndarray], progress: Progress |
             progress((step - told) * len(specs))
         told = step
 
-    response = simulate_cases(model, specs, motions, tell)
+    response = simulate_cases(model, specs, motions[:n], tell)
     tell(len(motions[0]) - 1)
-    field = free_field(model, motions, depths)
-    every = model.spec.output.every
-    base = np.zeros((len(specs), len(response.time), 2))
-    for lane, motion in enumerate(motions):
-        kept = motion[::every]
-        base[lane, : len(kept)] = kept
-    extra = {
+    field = free_field(model, motions[:n], depths[:n])
+    each = _of_each_case(job.specs, motions)
+    extra = {name: values[:n] for name, values in each.items()} | {
         "racking_free_field": field.racking,
         "peak_racking_free_field": field.peak,
         "reference_displacement": field.reference,
-        "base_acceleration": base,
+    }
+    return Outcome(model, with_followers(case_arrays(model, response, extra), job.lane, job.factor) | each)
+
+
+def _of_each_case(specs: list[Spec], motions: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """What is known of cases without marching them; motions (n_step + 1, 2) [m/s²] at the base."""
+    time, every = specs[0].time, specs[0].output.every
+    return {
+        "base_acceleration": np.array([motion[::every] for motion in motions]),
         "peak_base_acceleration": np.array([np.abs(motion).max(axis=0) for motion in motions]),
-        "response_spectrum": np.array([_spectrum(motion.tobytes(), model.spec.time.dt) for motion in motions]),
+        "response_spectrum": np.array([_spectrum(motion.tobytes(), time.dt) for motion in motions]),
         "uplift_over_weight": np.array([uplift_over_weight(spec) for spec in specs]),
     }
-    return Outcome(model, case_arrays(model, response, extra))
 
 
 def trace_case(study: Study, case: int, tell: Callable[[Trace, Model], None]) -> tuple[Status, str]:

@@ -56,7 +56,11 @@ def _short_hashes(records: str) -> str:
 def _cases(ds: xr.Dataset) -> str:
     status = ds["status"].values.ravel()
     ended = {s: int((status == s).sum()) for s in Status}
-    return f"{status.size}: " + ", ".join(f"{count} {s.name.lower().replace('_', ' ')}" for s, count in ended.items() if count)
+    words = ", ".join(f"{count} {s.name.lower().replace('_', ' ')}" for s, count in ended.items() if count)
+    solved = np.unique(ds["solved_as"]).size
+    return f"{status.size}: {words}" + (
+        f"; {solved} solved, the others are one of these times a factor" if solved < status.size else ""
+    )
 
 
 MOST_SHOWN = 9

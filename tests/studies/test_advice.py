@@ -40,6 +40,13 @@ def facts_of(text, workers=1):
     return dict(advise(study_of(text), workers).facts)
 
 
+def test_work_is_that_of_the_solved_cases():
+    """Nine cases of 200 steps; five ratios without self-weight, which share a batch."""
+    text = QUIET + '[sweep]\np0 = ["1 MPa", "2 MPa", "4 MPa"]\nscale = [1, 2, 4]\n'
+    assert facts_of(text)["cases"].startswith("9 in 1 batch, 1,800 case-steps")
+    assert facts_of(text + "[gravity]\nself_weight = false")["cases"].startswith("9 in 1 batch, 1,000 case-steps")
+
+
 # bending bound ---------------------------------------------------------------------------------------------------------------
 
 

@@ -207,7 +207,7 @@ def test_every_case_is_that_of_a_study_of_its_own(run):
     for i, case in enumerate(study.cases):
         one, own = ds.isel({axis.name: i}), run_study(alone(case, study.motions), workers=1)
         for name, variable in SCHEMA.items():
-            if variable.long_name in ("why the case failed",):
+            if name in ("reason", "solved_as"):  # words; the number of the case in its study
                 continue
             mine, theirs = one[name].values.astype(float), own[name].values.astype(float)
             if "time" in variable.dims:

@@ -85,6 +85,21 @@ def test_run_writes_the_results_and_says_what_happened(quick_toml, folder, quick
     xr.testing.assert_equal(xr.load_dataset("results/quick.nc", engine="netcdf4"), quick_ds)
 
 
+def test_check_run_and_show_say_that_ratios_are_solved_once(folder):
+    grid = 'p0 = ["1 MPa", "2 MPa"]\nscale = [1, 2]\n'
+    (folder / "grid.toml").write_text(f'title = "Grid"\n{SHORT}[gravity]\nself_weight = false\n[sweep]\n{grid}')
+    said = (
+        "4 cases, 3 solved: each other one has the loads of one of these times a factor, and so its response times that factor."
+    )
+    assert said in call("check", "grid.toml").stdout.splitlines()
+    assert said in flat(call("run", "grid.toml", "--workers", 1).stdout)
+    assert "4: 4 done; 3 solved, " in call("show", "results/grid.nc").stdout
+
+
+def test_nothing_is_said_where_all_cases_are_solved(quick_toml):
+    assert "solved" not in call("check", quick_toml).stdout + call("run", quick_toml, "--workers", 1).stdout
+
+
 def test_run_again_computes_nothing(quick_toml, folder, monkeypatch):
     call("run", quick_toml, "--workers", 1)
     before = (folder / "results/quick.nc").stat().st_mtime_ns

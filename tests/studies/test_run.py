@@ -11,7 +11,8 @@ import xarray as xr
 import studies
 from engine import Status, build_model
 from studies import run_study, write_dataset
-from studies.run import ONE_THREAD, run_batch, trace_case, uplift_over_weight
+from studies.plan import Batch
+from studies.run import ONE_THREAD, Job, run_batch, trace_case, uplift_over_weight
 
 from .conftest import FAILING, QUICK, SHORT, study_of
 
@@ -48,7 +49,7 @@ def test_kernels_are_compiled_before_processes_start(monkeypatch):
 
     def in_pool(jobs, workers):
         done.append("pool")
-        return ((i, RUNNER._guarded(*job)) for i, job in jobs.items())
+        return ((i, RUNNER._guarded(job)) for i, job in jobs.items())
 
     monkeypatch.setattr(RUNNER, "compile_kernels", lambda: done.append("compiled"))
     monkeypatch.setattr(RUNNER, "_in_pool", in_pool)
@@ -62,7 +63,7 @@ def test_a_second_run_gives_the_same_bits(quick, quick_ds):
 
 @pytest.mark.parametrize("case", range(4))
 def test_a_case_alone_gives_the_bits_of_the_case_in_company(case, quick, quick_ds):
-    outcome = run_batch([quick.cases[case]], [quick.ground(case)])
+    outcome = run_batch(Job.of(quick, Batch((case,))))
     for name, values in outcome.arrays.items():
         if name in quick_ds and values.dtype.kind in "fi" and name != "time":
             here = quick_ds[name].isel(p0=case) if "p0" in quick_ds[name].dims else quick_ds[name]
