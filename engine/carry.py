@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+import scipy  # its scipy.fft is imported where it is first used, which few runs do
 from scipy.linalg import eigh
 
 from .column import column_system
@@ -33,11 +33,16 @@ def carried_down(model: Model, motions: Sequence[Floats], depth: float) -> list[
     start before t = 0: a deeper base moves earlier by the travel time of the waves.
     """
     n = len(motions[0])
-    n_padded = next_fast_len(PADDING * n, real=True)
+    n_padded = scipy.fft.next_fast_len(PADDING * n, real=True)
     z = np.exp(2j * np.pi * (np.arange(n_padded // 2 + 1) / n_padded).clip(max=NEARLY_HALF))
     transfer = _within_over_base(model, depth, z)
     transfer *= np.maximum(1.0, WATER_LEVEL / np.abs(transfer))
-    return [irfft(rfft(motion, n_padded, axis=0) / transfer, n_padded, axis=0)[:n] for motion in motions]
+    return [_filtered(motion, transfer, n_padded)[:n] for motion in motions]
+
+
+def _filtered(motion: Floats, divisor: Complex, n_padded: int) -> Floats:
+    """The motion (n, 2) continued by zeros, its transform divided by `divisor`."""
+    return scipy.fft.irfft(scipy.fft.rfft(motion, n_padded, axis=0) / divisor, n_padded, axis=0)
 
 
 def _within_over_base(model: Model, depth: float, z: Complex) -> Complex:

@@ -5,7 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
+
+from .resampling import resample
 
 TAPER = 1.0
 """[s] of cosine taper at both ends of a cut motion."""
@@ -63,7 +64,7 @@ class GroundMotion:
             raise MotionError(
                 f"{self.name}: step {self.dt:g} s cannot be brought to {dt:g} s by a ratio of whole numbers up to 1000"
             )
-        values = resample_poly(self.acceleration, ratio.numerator, ratio.denominator)
+        values = resample(self.acceleration, ratio.numerator, ratio.denominator)
         return replace(self, dt=dt, acceleration=values)
 
     def scale_to(self, peak: float) -> float:

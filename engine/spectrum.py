@@ -4,7 +4,7 @@ from math import ceil, factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
+from scipy.linalg.lapack import ztbtrs
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -52,12 +52,23 @@ def _pseudo_acceleration(a: Floats, dt: float, w: float, damping: float) -> Floa
     pole = w * complex(-damping, np.sqrt(1 - damping**2))
     parts = max(1, ceil(SAMPLES_A_PERIOD * dt * w / (2 * np.pi)))
     decay, before, after = _factors(pole, dt, dt * np.arange(1, parts + 1) / parts)
-    z = lfilter([after[-1], before[-1]], [1.0, -decay[-1]], a.astype(complex), axis=0, zi=-after[-1] * a[:1])[0]
+    z = _accumulated(decay[-1], before[-1] * a[:-1] + after[-1] * a[1:])
     x, y = np.ascontiguousarray(z.real), np.ascontiguousarray(z.imag)
     peak = np.abs(y).max(axis=0)
     for d, b, c in zip(decay[:-1], before[:-1].imag, after[:-1].imag, strict=True):
         peak = np.maximum(peak, np.abs(d.imag * x[:-1] + d.real * y[:-1] + b * a[:-1] + c * a[1:]).max(axis=0))
     return np.maximum(peak, _free_peak(z[-1], pole)) * w**2 / pole.imag
+
+
+def _accumulated(decay: complex, added: Complexes) -> Complexes:
+    """z (n, …) with z_0 = 0 and z_i = decay z_(i-1) + added_(i-1), added (n - 1, …): forward substitution in a band of two.
+
+    scipy.signal has a filter for that, but takes half a second to import.
+    """
+    bands = np.ones((2, len(added)), dtype=np.complex128)
+    bands[1] = -decay
+    z, _ = ztbtrs(bands, added.reshape(len(added), -1), uplo="L", diag="U")
+    return np.concatenate([np.zeros((1, *added.shape[1:])), z.reshape(added.shape)])
 
 
 def _factors(pole: complex, dt: float, tau: Floats) -> tuple[Complexes, Complexes, Complexes]:

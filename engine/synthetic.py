@@ -3,9 +3,8 @@
 from math import ceil, log, pi, tan
 
 import numpy as np
+import scipy  # its scipy.signal takes half a second to import, where it is first used: synthetic motions alone wait for it
 from numpy.typing import NDArray
-from scipy.integrate import quad
-from scipy.signal import bilinear, sosfilt
 
 from .groundmotion import GroundMotion, MotionError
 from .spec import Ricker, Synthetic
@@ -35,7 +34,7 @@ def synthetic(description: Synthetic, duration: float, direction: int = 0) -> Gr
     _refuse_unfit(description, duration)
     n = max(2, ceil(duration / description.step) + 1)
     noise = np.random.Generator(np.random.PCG64(np.random.SeedSequence([description.seed, direction]))).standard_normal(n)
-    filtered = sosfilt(_filter(description), noise) / _rms(description)
+    filtered = scipy.signal.sosfilt(_filter(description), noise) / _rms(description)
     return GroundMotion("synthetic", description.step, filtered * envelope(description, np.arange(n) * description.step))
 
 
@@ -69,8 +68,8 @@ def _filter(description: Synthetic) -> Floats:
     wg, wf = _analogue(description)
     zg, zf = description.ground_damping, description.low_damping
     rate = 1 / description.step
-    ground = bilinear([2 * zg * wg, wg**2], [1.0, 2 * zg * wg, wg**2], rate)
-    low = bilinear([1.0, 0.0, 0.0], [1.0, 2 * zf * wf, wf**2], rate)
+    ground = scipy.signal.bilinear([2 * zg * wg, wg**2], [1.0, 2 * zg * wg, wg**2], rate)
+    low = scipy.signal.bilinear([1.0, 0.0, 0.0], [1.0, 2 * zf * wf, wf**2], rate)
     return np.array([np.concatenate(section) for section in (ground, low)])
 
 
@@ -98,7 +97,9 @@ def _rms(description: Synthetic) -> float:
 
     # Beyond these ends lie less than 1e-9 of it: the integrand falls with the fifth power of w below, with the third above.
     ends = log(1e-3 * min(wg, wf)), log(1e4 / h)
-    mean_square, *_ = quad(share, *ends, points=sorted({log(wg), log(wf)}), limit=500, epsabs=0, epsrel=1e-9, full_output=1)
+    mean_square, *_ = scipy.integrate.quad(
+        share, *ends, points=sorted({log(wg), log(wf)}), limit=500, epsabs=0, epsrel=1e-9, full_output=1
+    )
     return float(np.sqrt(mean_square / pi))
 
 

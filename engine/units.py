@@ -26,9 +26,27 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-@cache
+_COMMON = {
+    "m": {"cm": 1e-2, "mm": 1e-3},
+    "s": {"ms": 1e-3},
+    "Pa": {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "kN/m**2": 1e3, "N/cm**2": 1e4, "N/mm**2": 1e6},
+    "m/s**2": {"cm/s**2": 1e-2, "g_0": 9.80665},
+    "kg/m**3": {"t/m**3": 1e3},
+    "N/m**3": {"kN/m**3": 1e3},
+}
+"""What pint says of the units that most studies are written in: to start it takes longer than to read a study."""
+
+
 def _factor(written: str, wanted: str) -> float:
     """What one `written` unit is in `wanted` units; ValueError where it is no such unit."""
+    if written == wanted:
+        return 1.0
+    return _COMMON.get(wanted, {}).get(written) or _by_pint(written, wanted)
+
+
+@cache
+def _by_pint(written: str, wanted: str) -> float:
+    """`_factor` of any unit that there is."""
     import pint
 
     if re.match(r",\d", written):

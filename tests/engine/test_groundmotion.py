@@ -52,7 +52,7 @@ def sine(frequency, dt, duration=30.0):
     return GroundMotion("sine", dt, np.sin(2 * np.pi * frequency * np.arange(round(duration / dt) + 1) * dt + 0.3))
 
 
-# resample_poly filters with a Kaiser window of beta = 5: 0.1102 (A - 8.7) = 5 gives A = 54 dB of ripple and leakage.
+# The filter has a Kaiser window of beta = 5: 0.1102 (A - 8.7) = 5 gives A = 54 dB of ripple and leakage.
 RIPPLE = 10 ** (-54 / 20)
 
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from engine.units import Quantity, in_si
+from engine.units import _COMMON, Quantity, _by_pint, in_si
 
 FILE = {"from_file": True}
 
@@ -47,6 +47,11 @@ FILE = {"from_file": True}
 def test_written_units_become_si(written, unit, value):
     # One product with a conversion factor that is itself a product of a few decimal numbers.
     assert in_si(written, unit, unit_required=True) == pytest.approx(value, rel=1e-15 * 8)
+
+
+@pytest.mark.parametrize(("wanted", "written"), [(wanted, written) for wanted, units in _COMMON.items() for written in units])
+def test_common_units_are_what_pint_says(wanted, written):
+    assert _COMMON[wanted][written] == _by_pint(written, wanted)
 
 
 @pytest.mark.parametrize("value", [20, 20.0, 0.1])
