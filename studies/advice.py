@@ -12,7 +12,7 @@ from engine.spec import GENERATED, Box, Domain, Layer, MeshOptions
 
 from .messages import in_words
 from .plan import Study
-from .run import uplift_over_weight
+from .uplift import uplift_over_weight
 
 SECONDS_PER_STEP_AND_DOF = 0.4e-6
 """Of a batch, whether it holds one case or sixteen; for the estimate of `check`, measured by runs of `p0` and `damping`."""

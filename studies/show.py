@@ -8,7 +8,7 @@ import xarray as xr
 from engine import Model, Status, Trace
 
 from .messages import in_words
-from .table import axes_of
+from .tables import axes_of
 
 TRACE_HEAD = f"{'step':>7} {'time [s]':>10} {'open':>5} {'stick':>5} {'slip':>5} {'solves':>6} {'residual':>9}"
 

@@ -13,7 +13,7 @@ from engine import Status
 
 from ..domain_size import is_domain_size
 from ..messages import in_words
-from ..table import axes_of, cases_of
+from ..tables import axes_of, cases_of
 from .box import deformed_figure, mesh_figure
 from .contact import contact_figure, joint_figure
 from .convergence import convergence_figure

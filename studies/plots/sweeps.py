@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..messages import in_words
-from ..table import axes_of
+from ..tables import axes_of
 from .style import LINES, MANY_LINES, WIDTH, axis_label, axis_unit, in_lines, log_ticks, point_in_words, scale_x, symbol
 
 GRID_QUANTITIES: dict[str, tuple[str, Callable[[xr.Dataset], xr.DataArray]]] = {

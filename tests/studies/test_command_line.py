@@ -12,10 +12,10 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-import studies.__main__
 from engine.spec import Layer, Spec
-from studies import load_study, run_study, sentences, shipped_studies, table, write_dataset
+from studies import load_study, run_study, runner, sentences, shipped_studies, table, write_dataset
 from studies.__main__ import app
+from studies.commands import running
 from studies.show import TRACE_HEAD, show_lines
 from studies.sizes import DomainSizes
 
@@ -103,7 +103,7 @@ def test_nothing_is_said_where_all_cases_are_solved(quick_toml):
 def test_run_again_computes_nothing(quick_toml, folder, monkeypatch):
     call("run", quick_toml, "--workers", 1)
     before = (folder / "results/quick.nc").stat().st_mtime_ns
-    monkeypatch.setattr(studies.__main__, "run_study", lambda *a, **k: pytest.fail("it ran"))
+    monkeypatch.setattr(running, "run_study", lambda *a, **k: pytest.fail("it ran"))
     outcome = call("run", quick_toml)
     assert outcome.exit_code == 0
     assert "there already" in flat(outcome.stdout)
@@ -187,7 +187,7 @@ def test_a_study_of_which_nothing_can_be_built_is_told_in_one_line(quick_toml, f
     def too_large(spec):
         raise MemoryError("no room for the mesh")
 
-    monkeypatch.setattr(sys.modules["studies.run"], "build_model", too_large)
+    monkeypatch.setattr(runner, "build_model", too_large)
     outcome = call("run", quick_toml, "--workers", 1)
     assert outcome.exit_code in (1, 2)
     assert "no room for the mesh" in flat(outcome.stdout + outcome.stderr)
@@ -198,7 +198,7 @@ def test_an_interrupted_run_writes_nothing(quick_toml, folder, monkeypatch):
     def interrupted(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(studies.__main__, "run_study", interrupted)
+    monkeypatch.setattr(running, "run_study", interrupted)
     outcome = call("run", quick_toml, "--out", "x.nc")
     assert outcome.exit_code == 130
     assert "Stopped; x.nc was not written." in flat(outcome.stderr)
@@ -210,7 +210,7 @@ def test_an_interrupted_run_leaves_the_file_of_before(quick_toml, results, monke
         raise KeyboardInterrupt
 
     before = results.read_bytes()
-    monkeypatch.setattr(studies.__main__, "run_study", interrupted)
+    monkeypatch.setattr(running, "run_study", interrupted)
     assert call("run", quick_toml, "--out", results, "--fresh").exit_code == 130
     assert results.read_bytes() == before
 
@@ -219,7 +219,7 @@ def test_a_disk_that_is_full_is_told_in_one_line(quick_toml, folder, monkeypatch
     def full(ds, path):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(studies.__main__, "write_dataset", full)
+    monkeypatch.setattr(running, "write_dataset", full)
     outcome = call("run", quick_toml, "--out", "x.nc", "--workers", 1)
     assert outcome.exit_code == 2
     assert "x.nc: cannot be written: No space left on device" in outcome.stderr.splitlines()
@@ -354,7 +354,7 @@ def test_a_netcdf_file_of_others_is_told_in_one_line(command, folder):
 
 
 def test_check_says_what_would_run_and_runs_nothing(quick_toml, folder, monkeypatch):
-    monkeypatch.setattr(studies.__main__, "run_study", lambda *a, **k: pytest.fail("it ran"))
+    monkeypatch.setattr(running, "run_study", lambda *a, **k: pytest.fail("it ran"))
     outcome = call("check", quick_toml)
     assert outcome.exit_code == 0
     assert files(folder) == ["quick.toml"]

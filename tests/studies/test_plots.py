@@ -24,7 +24,7 @@ from studies.plots.racking import NU, SCATTER, published, racking_figure
 from studies.plots.sections import FORCES, MEMBERS, interaction_figure, sections_figure
 from studies.plots.style import JOINT_COLOURS, JOINT_STATES, LINES, MANY_LINES, STYLE, WIDTH, in_lines
 from studies.plots.sweeps import GRID_QUANTITIES, grid_figure, peaks_figure
-from studies.table import axes_of, cases_of
+from studies.tables import axes_of, cases_of
 
 from .conftest import COARSE, FAILING, SHORT, study_of
 

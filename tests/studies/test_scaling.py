@@ -1,22 +1,17 @@
 """(D13): of cases whose loads differ by one factor one is solved, and the others are its response times that factor."""
 
-import sys
-
 import numpy as np
 import pytest
 import xarray as xr
 
 from engine import Status
-from studies import run_study
+from studies import run_study, runner
 from studies.plan import Batch
-from studies.run import Job, run_batch
+from studies.runner import Job, run_batch
 from studies.scaling import SAME
 from studies.schema import SCHEMA
 
 from .conftest import LOOSE, SHORT, study_of
-
-RUNNER = sys.modules["studies.run"]
-"""The module: the package's attribute of that name is its function."""
 
 LIGHT = SHORT + "[gravity]\nself_weight = false\n"
 """Without self-weight, so that pressure and motion are all the loads."""
@@ -205,14 +200,14 @@ def test_a_failed_case_fails_with_all_that_follow_from_it():
 
 def test_a_lost_batch_loses_its_followers_and_says_what_they_were(monkeypatch):
     study = study_of(f'{LIGHT}[sweep]\np0 = ["1 MPa", "2 MPa"]\nscale = [1, 2]\ndamping_ratio = [0.02, 0.05]')
-    built = RUNNER.build_model
+    built = runner.build_model
 
     def too_large(spec):
         if spec.damping.ratio == 0.05:
             raise MemoryError("no room for the mesh")
         return built(spec)
 
-    monkeypatch.setattr(RUNNER, "build_model", too_large)
+    monkeypatch.setattr(runner, "build_model", too_large)
     ds = run_study(study, workers=1)
     assert (ds["status"].sel(damping_ratio=0.05) == Status.NOT_RUN).all()
     assert (ds["status"].sel(damping_ratio=0.02) == Status.DONE).all()

@@ -9,10 +9,10 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-import studies.__main__
 from studies import load_study, sentences, shipped_studies, table, write_dataset
 from studies.__main__ import app
 from studies.advice import advise
+from studies.commands import console, running
 from studies.show import show_lines
 
 from .conftest import QUICK
@@ -36,7 +36,7 @@ def say(folder, monkeypatch):
     def call(width, *arguments):
         monkeypatch.chdir(folder)
         for name, stderr in (("out", False), ("err", True)):
-            monkeypatch.setattr(studies.__main__, name, Console(width=width, stderr=stderr, highlight=False))
+            monkeypatch.setattr(console, name, Console(width=width, stderr=stderr, highlight=False))
         outcome = CliRunner().invoke(app, [str(argument) for argument in arguments])
         assert outcome.exit_code == 0, outcome.output
         assert "\x1b" not in outcome.output  # a pipe, not a terminal
@@ -101,9 +101,9 @@ def test_run_says_its_sentences_and_its_summary(say, quick_ds, width):
 
 @pytest.mark.parametrize("width", [40, 200])
 def test_no_number_of_the_summary_is_cut(width, monkeypatch, capsys):
-    monkeypatch.setattr(studies.__main__, "out", Console(width=width, highlight=False))
+    monkeypatch.setattr(console, "out", Console(width=width, highlight=False))
     row = ("a-long-name-of-a-study", "100000", "100000", "12345.6 s", "/some/where/deep/below/results/a-long-name-of-a-study.nc")
-    studies.__main__._sum_up([row])
+    running._sum_up([row])
     said = capsys.readouterr().out
     for text in row[1:]:
         assert text in said
@@ -129,8 +129,8 @@ def test_no_colour_on_a_terminal_that_wants_none(command, environment, attribute
     """NO_COLOR leaves bold letters and the moving bar, a dumb terminal gets no code at all."""
     monkeypatch.chdir(folder)
     for name, stderr in (("out", False), ("err", True)):
-        console = Console(force_terminal=True, stderr=stderr, highlight=False, width=40, _environ=environment)
-        monkeypatch.setattr(studies.__main__, name, console)
+        terminal = Console(force_terminal=True, stderr=stderr, highlight=False, width=40, _environ=environment)
+        monkeypatch.setattr(console, name, terminal)
     outcome = CliRunner().invoke(app, command)
     assert outcome.exit_code == 0
     assert not re.search(r"\x1b\[[\d;]*\b(3|4|9|10)\d(;|m)", outcome.output)

@@ -2,24 +2,20 @@
 
 import multiprocessing
 import os
-import sys
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import studies
-from engine import Status, build_model
-from studies import run_study, write_dataset
+from engine import Status
+from studies import run_study, runner, write_dataset
 from studies.plan import Batch
-from studies.run import ONE_THREAD, Job, run_batch, trace_case, uplift_over_weight
+from studies.runner import ONE_THREAD, Job, run_batch, trace_case
 
 from .conftest import FAILING, QUICK, SHORT, study_of
 
 TWO_BATCHES = f'{SHORT}[sweep]\np0 = [0, "0.2 MPa", "4 MPa"]\ndamping_ratio = [0.02, 0.05]\n'
-
-RUNNER = sys.modules["studies.run"]
-"""The module: the package's attribute of that name is its function."""
 
 
 def assert_same_bits(left, right):
@@ -49,10 +45,10 @@ def test_kernels_are_compiled_before_processes_start(monkeypatch):
 
     def in_pool(jobs, workers):
         done.append("pool")
-        return ((i, RUNNER._guarded(job)) for i, job in jobs.items())
+        return ((i, runner._guarded(job)) for i, job in jobs.items())
 
-    monkeypatch.setattr(RUNNER, "compile_kernels", lambda: done.append("compiled"))
-    monkeypatch.setattr(RUNNER, "_in_pool", in_pool)
+    monkeypatch.setattr(runner, "compile_kernels", lambda: done.append("compiled"))
+    monkeypatch.setattr(runner, "_in_pool", in_pool)
     run_study(study_of(TWO_BATCHES), workers=2)
     assert done == ["compiled", "pool"]
 
@@ -104,18 +100,6 @@ def test_run_of_a_wrong_study_raises(tmp_path):
     path.write_text("[box]\nnu = 0.7\n")
     with pytest.raises(studies.StudyError, match=r"bad.toml: box.nu = 0.7: must be less than 0.5"):
         studies.run(path)
-
-
-@pytest.mark.parametrize("box", ["", '[box]\ndepth = "0 m"\n', '[box]\nwidth = "6 m"\nwall = "0.4 m"\noffset = "1 m"\n'])
-def test_uplift_is_the_resultant_of_the_pressure_over_the_weight(box):
-    """The closed form is what the assembled loads add up to."""
-    spec = study_of(SHORT + box + '[pressure]\np0 = "2 MPa"\n').cases[0]
-    model = build_model(spec)
-    vertical = model.system.expand.T @ np.tile([0.0, 1.0], len(model.system.mesh.nodes))
-    inner = (spec.box.width - 2 * spec.box.wall) * (spec.box.height - 2 * spec.box.wall)
-    weight = (spec.box.width * spec.box.height - inner) * spec.box.density * spec.gravity.acceleration
-    # linear pressure on straight edges is integrated exactly; the tolerance is that of a sum of a few forces
-    assert uplift_over_weight(spec) == pytest.approx(vertical @ model.pressure(spec) / weight, rel=1e-12)
 
 
 # step by step ----------------------------------------------------------------------------------------------------------------
@@ -171,14 +155,14 @@ def test_trace_knows_the_case_s_own_model():
 
 def test_a_batch_that_cannot_be_built_does_not_stop_the_others(monkeypatch):
     """Failed cases are NaN with status and reason; they never stop a study (DESIGN section 5)."""
-    built = RUNNER.build_model
+    built = runner.build_model
 
     def too_large(spec):
         if spec.damping.ratio == 0.05:
             raise MemoryError("no room for the mesh")
         return built(spec)
 
-    monkeypatch.setattr(RUNNER, "build_model", too_large)
+    monkeypatch.setattr(runner, "build_model", too_large)
     ds = run_study(study_of(TWO_BATCHES), workers=1)
     assert (ds["status"].sel(damping_ratio=0.02) == Status.DONE).all()
     assert (ds["status"].sel(damping_ratio=0.05) >= Status.NOT_CONVERGED).all()

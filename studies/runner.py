@@ -32,6 +32,7 @@ from .dataset import build_dataset, case_arrays, with_followers
 from .domain_size import with_convergence
 from .messages import StudyError
 from .plan import Batch, Study, load_study
+from .uplift import uplift_over_weight
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -262,14 +263,6 @@ def _at_the_base(model: Model, motions: list[np.ndarray], depths: list[float]) -
             for lane, base in zip(lanes, carried_down(model, [motions[lane] for lane in lanes], depth), strict=True):
                 found[lane] = base
     return found
-
-
-def uplift_over_weight(spec: Spec) -> float:
-    """Net upward resultant of the water pressure on the box, p0 width height / H_ref, over the box's weight under gravity."""
-    box = spec.box
-    uplift = spec.pressure.p0 / spec.pressure.reference_height * box.width * box.height
-    solid = box.width * box.height - (box.width - 2 * box.wall) * (box.height - 2 * box.wall)
-    return uplift / (solid * box.density * spec.gravity.acceleration)
 
 
 def write_dataset(ds: xr.Dataset, path: Path) -> None:

@@ -7,7 +7,7 @@ import xarray as xr
 from engine import Status
 from studies import run_study, sentences, table
 from studies.messages import in_words
-from studies.table import axes_of, cases_of, failures
+from studies.tables import axes_of, cases_of, failures
 
 from .conftest import LOOSE, SHORT, study_of
 

@@ -1,0 +1,79 @@
+"""plot, show, table: what a results file holds."""
+
+from pathlib import Path
+
+import xarray as xr
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from ..show import show_lines
+from ..tables import axes_of, table
+from . import console
+from .console import refuse, say
+
+WIDEST_COLUMN = 30
+"""Characters that a column of results may need; the table is as wide as its content, narrower terminals wrap its lines."""
+
+
+def _open(path: Path) -> xr.Dataset:
+    if not path.is_file():
+        raise refuse([f"{path}: there is no such results file; results are written by `coralquake run`"])
+    try:
+        ds = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError):
+        raise refuse([f"{path}: is not a netCDF file that can be read"]) from None
+    if "study_hash" not in ds.attrs or "status" not in ds:
+        raise refuse([f"{path}: was not written by coralquake"])
+    return ds
+
+
+def draw(ds: xr.Dataset, path: Path) -> None:
+    """Draw the figures of a dataset beside its file."""
+    from ..plots import draw_all  # matplotlib is slow to import, and most commands draw nothing
+
+    try:
+        for figure in draw_all(ds, path):
+            say(f"figure  {figure}")
+    except OSError as error:
+        raise refuse([f"{path.parent}: figures cannot be written: {error.strerror or error}"]) from None
+
+
+def plot(path: Path) -> None:
+    """Draw the figures of a results file beside it."""
+    draw(_open(path), path)
+
+
+def show(path: Path) -> None:
+    """Say what a results file is."""
+    for line in show_lines(_open(path)):
+        say(line)
+
+
+def tabulate(path: Path, csv: Path | None) -> None:
+    """Print one row a case, or write them to a CSV file."""
+    ds = _open(path)
+    frame = table(ds)
+    if csv is not None:
+        try:
+            frame.to_csv(csv, index=False)
+        except OSError as error:
+            raise refuse([f"{csv}: cannot be written: {error.strerror or error}"]) from None
+        return
+    grid = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    for name in frame.columns:
+        head, factor = (str(name), 1.0) if str(name).startswith(tuple(axes_of(ds))) else _readable(str(name))
+        grid.add_column(escape(head), justify="right")
+        if frame[name].dtype.kind == "f":
+            frame[name] = [f"{factor * value:.3g}" for value in frame[name]]
+    for row in frame.itertuples(index=False):
+        grid.add_row(*map(str, row))
+    Console(width=max(console.out.width, WIDEST_COLUMN * len(frame.columns)), highlight=False).print(grid)
+
+
+def _readable(column: str) -> tuple[str, float]:
+    """Head of a column in units that make short numbers, and the factor to them."""
+    for si, unit, factor in (("[m]", "[mm]", 1e3), ("[Pa]", "[MPa]", 1e-6), (" [1]", "", 1.0)):
+        if column.endswith(si):
+            return column.removesuffix(si) + unit, factor
+    return column, 1.0

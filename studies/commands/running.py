@@ -1,0 +1,170 @@
+"""run: studies to netCDF files, or one case step by step."""
+
+import os
+import time
+from pathlib import Path
+
+import typer
+import xarray as xr
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from ..domain_size import convergence_sentences, is_domain_size, source_sentence
+from ..messages import StudyError
+from ..plan import Study, shipped_studies
+from ..provenance import study_hash
+from ..runner import run_study, trace_case, write_dataset
+from ..show import TRACE_HEAD, trace_line
+from ..tables import failures, sentences
+from . import console
+from .console import DONE, INTERRUPTED, SOME_FAILED, load_all, refuse, say
+from .reading import draw
+
+NARROW = 60
+"""Characters; on terminals narrower than this the summary is lines, not a table that would cut its numbers."""
+
+
+def named(studies: list[str] | None, everything: bool) -> list[str]:
+    """The studies that are asked for."""
+    names = list(shipped_studies()) if everything else studies or []
+    if not names:
+        raise refuse(["run: name a study, or say --all (coralquake list shows what is shipped)"])
+    return names
+
+
+def run(names: list[str], out_file: Path | None, workers: int | None, fresh: bool, figures: bool) -> None:
+    """Run studies; write a netCDF file for each, and say what happened."""
+    if out_file is not None and len(names) > 1:
+        raise refuse([f"--out {out_file}: is for one study, {len(names)} are named"])
+    loaded = load_all(names)
+    paths = [out_file or Path("results") / f"{study.name}.nc" for study in loaded]
+    _check_paths(paths, names)
+    rows: list[tuple[str, ...]] = []
+    failed = False
+    for study, path in zip(loaded, paths, strict=True):
+        ds, seconds = _run_one(study, path, workers, fresh)
+        lost = failures(ds)
+        failed = failed or bool(lost)
+        rows.append(
+            (study.name, str(len(study.cases)), str(len(lost)), f"{seconds:.1f} s" if seconds else "there already", str(path))
+        )
+        _tell(study, ds, lost)
+        if figures:
+            draw(ds, path)
+    _sum_up(rows)
+    raise typer.Exit(SOME_FAILED if failed else DONE)
+
+
+def trace(names: list[str], case: int | None, asked: bool) -> None:
+    """Print one case of one study step by step, where that is `asked` for and not only a case is named."""
+    if not asked:
+        raise refuse([f"--case {case}: is for --trace"])
+    if len(names) > 1:
+        raise refuse([f"--trace: is for one study, {len(names)} are named"])
+    (study,) = load_all(names)
+    n = len(study.cases)
+    if (case is None and n > 1) or (case is not None and case > n):
+        raise refuse([f"--case{'' if case is None else f' {case}'}: must be a number from 1 to {n}, the cases of {study.name}"])
+    index = (case or 1) - 1
+    print(f"case {index + 1} of {n}: {study.label(index)}")
+    print(TRACE_HEAD)
+    status, reason = trace_case(study, index, lambda step, model: print(trace_line(step, model)))
+    print(f"{status.name.lower().replace('_', ' ')}{f': {reason}' if reason else ''}")
+    raise typer.Exit(SOME_FAILED if reason else DONE)
+
+
+def _check_paths(paths: list[Path], sources: list[str]) -> None:
+    wrong = [f"{path}: is a folder, must be a file" for path in paths if path.is_dir()]
+    wrong += [
+        f"{path}: is a device or a pipe, results would replace it"
+        for path in paths
+        if path.exists() and not (path.is_file() or path.is_dir())
+    ]
+    places = [path.resolve() for path in paths]
+    read = {Path(source).resolve() for source in sources}
+    wrong += [f"{path}: is a study file, results would overwrite it" for path in paths if path.resolve() in read]
+    twice = dict.fromkeys(path for path, place in zip(paths, places, strict=True) if places.count(place) > 1)
+    wrong += [f"{path}: two of the studies would write it; run one with --out" for path in twice]
+    for folder in dict.fromkeys(path.parent for path in paths):
+        existing = next((p for p in (folder, *folder.parents) if p.exists()), Path())
+        if not existing.is_dir():
+            wrong.append(f"{existing}: is a file, must be a folder for the results")
+        elif not os.access(existing, os.W_OK):
+            wrong.append(f"{existing}: cannot be written to; choose another place with --out")
+    if wrong:
+        raise refuse(wrong)
+
+
+def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tuple[xr.Dataset, float]:
+    """The dataset and the seconds it took, zero where the file was there already."""
+    if not fresh and path.is_file() and (ds := _finished(study, path)) is not None:
+        return ds, 0.0
+    start = time.perf_counter()
+    total = study.case_steps
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    with Progress(*columns, console=console.err) as bar:
+        task = bar.add_task(study.name, total=total)
+        try:
+            ds = run_study(study, workers, lambda steps: bar.advance(task, steps))
+        except StudyError as error:
+            bar.stop()
+            raise refuse(error.mistakes) from None
+        except KeyboardInterrupt:
+            bar.stop()
+            console.err.print(f"Stopped; {path} was not written.")
+            raise typer.Exit(INTERRUPTED) from None
+        bar.update(task, completed=total)
+    try:
+        write_dataset(ds, path)
+    except OSError as error:
+        raise refuse([f"{path}: cannot be written: {error.strerror or error}"]) from None
+    return ds, time.perf_counter() - start
+
+
+def _finished(study: Study, path: Path) -> xr.Dataset | None:
+    """The dataset of this very study, where the file holds it."""
+    try:
+        ds = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError):
+        return None
+    return ds if ds.attrs.get("study_hash") == study_hash(study) else None
+
+
+def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
+    console.out.print()
+    console.out.print(Text(study.title, style="bold"))
+    for sentence in [study.scaling.sentence, *sentences(ds)]:
+        if sentence:
+            console.out.print(sentence, markup=False)
+    if is_domain_size(ds):
+        for sentence in [*convergence_sentences(ds), source_sentence(ds)]:
+            console.out.print(sentence, markup=False)
+    for line in lost[:20]:
+        console.out.print(f"failed: {line}", markup=False)
+    if len(lost) > 20:
+        console.out.print(f"… and {len(lost) - 20} more; see status and reason in the file")
+
+
+def _sum_up(rows: list[tuple[str, ...]]) -> None:
+    if console.out.width >= NARROW:
+        console.out.print(_summary(rows))
+        return
+    for study, cases, lost, seconds, path in rows:
+        console.out.print(f"\n{study}: {cases} cases, {lost} failures, {seconds}", markup=False)
+        say(path)
+
+
+def _summary(rows: list[tuple[str, ...]]) -> Table:
+    grid = Table(title="\nStudies", title_justify="left")
+    for name, justify in (("study", "left"), ("cases", "right"), ("failures", "right"), ("wall time", "right"), ("file", "left")):
+        grid.add_column(name, justify=justify, overflow="fold")  # type: ignore[arg-type]
+    for row in rows:
+        grid.add_row(*map(escape, row))
+    return grid
