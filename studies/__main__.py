@@ -3,9 +3,11 @@
 Each command imports what it needs when it is called: numba, scipy and xarray take a second, for which help need not wait.
 """
 
+import gc
 import sys
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -26,7 +28,21 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
+    gc.disable()  # until the imports of the command are done
     app()
+
+
+def _commands(name: str) -> Any:
+    """A module of `commands`, imported now.
+
+    Imports make half a million objects and hardly any garbage: to look for it among them, again and again, is a tenth of the
+    time that a small study takes. So that waits until they are there, and then leaves them out.
+    """
+    module = import_module(f"studies.commands.{name}")
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
+    return module
 
 
 @app.command()
@@ -41,8 +57,7 @@ def run(
     trace: Annotated[bool, typer.Option("--trace", help="print one case step by step, write nothing")] = False,
 ) -> None:
     """Run studies; write a netCDF file for each, and say what happened."""
-    from .commands import running
-
+    running = _commands("running")
     names = running.named(studies, everything)
     if trace or case is not None:
         running.trace(names, case, trace)
@@ -53,25 +68,19 @@ def run(
 @app.command()
 def check(study: StudyName, workers: Workers = None) -> None:
     """Validate a study and say what would run, its size and warnings; run nothing."""
-    from .commands import asking
-
-    asking.check(study, workers)
+    _commands("asking").check(study, workers)
 
 
 @app.command()
 def plot(results: ResultFile) -> None:
     """Draw the figures of a results file beside it."""
-    from .commands import reading
-
-    reading.plot(results)
+    _commands("reading").plot(results)
 
 
 @app.command()
 def show(results: ResultFile) -> None:
     """Say what a results file is: study, provenance, axes, how the cases ended, every variable with unit and meaning."""
-    from .commands import reading
-
-    reading.show(results)
+    _commands("reading").show(results)
 
 
 @app.command()
@@ -79,25 +88,19 @@ def table(
     results: ResultFile, csv: Annotated[Path | None, typer.Option(help="write the table to this file instead")] = None
 ) -> None:
     """Print one row a case: axes, status, peaks."""
-    from .commands import reading
-
-    reading.tabulate(results, csv)
+    _commands("reading").tabulate(results, csv)
 
 
 @app.command("list")
 def list_studies() -> None:
     """Name the shipped studies."""
-    from .commands import asking
-
-    asking.list_studies()
+    _commands("asking").list_studies()
 
 
 @app.command()
 def schema() -> None:
     """List every field of a study file: unit, default, rule, meaning."""
-    from .commands import asking
-
-    asking.schema()
+    _commands("asking").schema()
 
 
 if __name__ == "__main__":
