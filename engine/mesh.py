@@ -117,7 +117,7 @@ class Mesh:
         return replace(self, sections={**self.sections, name: section})
 
     def sides(self) -> Ints:
-        """A number for every side of a triangle, made of its corners."""
+        """A number for every side of a triangle, made of its corners; sorted."""
         return np.unique(_numbered(self.triangles[:, SIDES].reshape(-1, 2)))
 
     def probe_at(self, x: float, y: float) -> Probe:
@@ -328,8 +328,10 @@ def _check_sections(mesh: Mesh) -> None:
 
 
 def are_sides(pairs: Ints, sides: Ints) -> bool:
-    """Whether all pairs (n, 2) of nodes are among the sides, which are numbered as in `Mesh.sides`."""
-    return bool(np.isin(_numbered(pairs), sides).all())
+    """Whether all pairs (n, 2) of nodes are among the sides, which are numbered and sorted as in `Mesh.sides`."""
+    wanted = _numbered(pairs)
+    place = np.minimum(np.searchsorted(sides, wanted), len(sides) - 1)
+    return bool((sides[place] == wanted).all())
 
 
 def compacted(triangles: Ints, n_node: int) -> tuple[Ints, Ints, Ints]:
