@@ -10,6 +10,7 @@ from .carry import carried_down
 from .column import FreeField, free_field
 from .flexibility import flexibility_ratio, racking_modulus
 from .groundmotion import GroundMotion, MotionError
+from .kernels.condense import PHASES
 from .kernels.jit import LANES
 from .mesh import Mesh, MeshError, Probe, Section
 from .model import Model, build_model, newmark_of, simulate_cases
@@ -31,6 +32,7 @@ __all__ = [
     "FORCES",
     "LANES",
     "PERIODS",
+    "PHASES",
     "PRESETS",
     "BoxMesh",
     "Constraints",

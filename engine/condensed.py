@@ -1,18 +1,17 @@
 """A factorised matrix with the joints condensed out of it exactly (D7): forward sweep, joint solve, one backward sweep."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from .assembly import System, rows
+from .kernels import condense
+from .kernels.condense import Condensation, Dashpots, Found
 from .kernels.jit import LANES
-from .kernels.march import Contact, solve_joints
 from .kernels.panels import Factor, backward, factor_of, forward
-from .kernels.sparse import Rows, product, subtract_transposed_product
-from .kernels.states import Law, Workspace, workspace
-from .mesh import Flags, Floats, MeshError
+from .kernels.sparse import product
+from .kernels.states import workspace
+from .mesh import Floats, MeshError
 
 MAX_ROUNDS = 26
 """Direct solves a joint solve may take; the sweeps between them add up to some 30,000 by then."""
@@ -41,92 +40,43 @@ def solve(factor: Factor, x: Floats) -> Floats:
     return x
 
 
-def take_solution(into: Contact, source: Contact, lanes: slice | np.ndarray) -> None:
-    """Copy what a joint solve finds (gap, force, state) from one contact state to another, for the chosen lanes."""
-    for mine, theirs in ((into.gap, source.gap), (into.force, source.force), (into.state, source.state)):
-        mine[lanes] = theirs[lanes]
-
-
-@dataclass(frozen=True)
-class JointDamping:
-    """Dashpots of one step (D5), lane first: force = slope g + offset; T = (I + G slope)⁻¹ and G with them eliminated, T G."""
-
-    slope: Floats
-    offset: Floats
-    T: Floats
-    G: Floats
+def dashpots(slope: Floats, offset: Floats, T: Floats | None = None, G: Floats | None = None) -> Dashpots:
+    """Dashpots of a step (D5), lane first: force = slope g + offset (LANES, m); T = (I + G slope)⁻¹ and T G where any act."""
+    none = np.zeros((0, *2 * (slope.shape[1],)))
+    return Dashpots(slope, offset, none if T is None else T, none if G is None else G)
 
 
 class Condensed:
-    """Solver of matrix u + B_jᵀ (lambda(B_j u) + dashpots) = rhs for all lanes at once; holds its scratch arrays."""
+    """Solver of matrix u + B_jᵀ (lambda(B_j u) + dashpots) = rhs for all lanes at once; with its scratch arrays."""
 
     def __init__(self, system: System, matrix: sp.sparray) -> None:
-        self.factor: Factor = factorise(matrix, system.n_interior)
-        self.B: Rows = rows(system.B)
-        self.n_point = len(system.points)
-        m = 2 * self.n_point
-        self.u: Floats = np.zeros((system.n_dof, LANES))
-        self.rounds = np.zeros(LANES, dtype=np.int64)
-        self.residual: Floats = np.zeros(LANES)
-        self.source: Floats = np.zeros(LANES)
-        self._tail: Floats = np.zeros((system.n_dof, LANES))
-        self._gap: Floats = np.zeros((m, LANES))
-        self._work: Workspace = workspace(self.n_point, LANES)
-        self.G: Floats = np.ascontiguousarray(self._flexibility(system)[None])
+        n, m = system.n_dof, 2 * len(system.points)
+        factor, tail, gap = factorise(matrix, system.n_interior), np.zeros((n, LANES)), np.zeros((m, LANES))
+        self.report = Found(np.zeros(LANES, dtype=np.int64), np.zeros(LANES), np.zeros(LANES))
+        self.clock = np.zeros(len(condense.PHASES), dtype=np.int64)
+        work = workspace(m // 2, LANES)
+        self.of = Condensation(factor, rows(system.B), np.zeros((1, m, m)), tail, np.zeros_like(tail), gap, work)
+        self.of.G[0] = self._flexibility(system)
+
+    @property
+    def G(self) -> Floats:
+        """Flexibility of the joints (1, m, m)."""
+        return self.of.G
 
     def _flexibility(self, system: System) -> Floats:
         """G = B_j matrix⁻¹ B_jᵀ (m, m), from the trailing block alone, LANES columns at a time; symmetrised."""
-        m = 2 * self.n_point
+        factor, tail, m = self.of.factor, self.of.tail, self.of.gap.shape[0]
         G = np.zeros((m, m))
-        dense = system.B.toarray()
         for start in range(0, m, LANES):
             width = min(LANES, m - start)
-            self._tail[:] = 0.0
-            self._tail[:, :width] = dense[start : start + width].T
-            forward(self.factor, self.factor.n_interior, self._tail)
-            backward(self.factor, self.factor.n_interior, self._tail)
-            product(self.B, self._tail, self._gap)
-            G[:, start : start + width] = self._gap[:, :width]
+            tail[:] = 0.0
+            tail[:, :width] = system.B[start : start + width].toarray().T
+            forward(factor, factor.n_interior, tail)
+            backward(factor, factor.n_interior, tail)
+            product(self.of.B, tail, self.of.gap)
+            G[:, start : start + width] = self.of.gap[:, :width]
         return 0.5 * (G + G.T)
 
-    def solve(
-        self, rhs: Floats, law: Law, n_lane: int, before: Contact, found: Contact, damping: JointDamping | None = None
-    ) -> Flags:
-        """Solve for u and the joints: fills self.u, rounds, residual, source and `found`; (n_lane,) True where it failed.
-
-        rhs : (n_dof, LANES), the joint forces are taken off it
-        before : joint state the solve starts from; a lane that fails is given that state's forces
-        """
-        start = self.factor.n_interior
-        self.u[:] = rhs
-        forward(self.factor, 0, self.u)
-        self._tail[start:] = self.u[start:]
-        backward(self.factor, start, self._tail)
-        product(self.B, self._tail, self._gap)
-        if damping is not None:
-            for lane in range(n_lane):
-                self._gap[:, lane] = damping.T[lane] @ (self._gap[:, lane] - self.G[0] @ damping.offset[lane])
-        take_solution(found, before, slice(None))
-        G = self.G if damping is None else damping.G
-        solve_joints(
-            G, self._gap, law, n_lane, MAX_ROUNDS, self._work, before.slip, found, self.rounds, self.residual, self.source
-        )
-        failed = self.rounds[:n_lane] < 0
-        take_solution(found, before, np.flatnonzero(failed))
-        self._apply(rhs, found.force if damping is None else found.force + damping.slope * found.gap + damping.offset)
-        return failed
-
-    def _apply(self, rhs: Floats, force: Floats) -> None:
-        """Take the joint forces (LANES, m) off rhs and off the half-solved u, and sweep backward."""
-        start = self.factor.n_interior
-        self._gap[:] = force.T
-        subtract_transposed_product(self.B, self._gap, rhs)
-        self._tail[start:] = 0.0
-        subtract_transposed_product(self.B, self._gap, self._tail)
-        forward(self.factor, start, self._tail)
-        self.u[start:] += self._tail[start:]
-        backward(self.factor, 0, self.u)
-
     def forget(self, lanes: int | slice) -> None:
-        """Drop the joint factors kept for these lanes; their flexibility or their joints have changed."""
-        self._work.factored[lanes] = -1
+        """Drop the inverses kept for these lanes; their flexibility or their joints have changed."""
+        self.of.work.state[lanes] = -1

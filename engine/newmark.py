@@ -1,21 +1,30 @@
 """Stepper: one Newmark step of all lanes with a constant, once-factorised matrix (D6–D9), and the halving of steps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from .assembly import System, rows
-from .condensed import Condensed, JointDamping, factorise, solve
+from .condensed import MAX_ROUNDS, Condensed, dashpots, factorise, solve
+from .kernels.condense import Dashpots
 from .kernels.jit import LANES
 from .kernels.joint import OPEN, STICK
-from .kernels.march import Contact, Loads, Rates, commit, commit_joints, history
-from .kernels.sparse import Rows, product, subtract_transposed_product
+from .kernels.loop import TO_COMMIT, TO_SOLVE, Account, Drive, Stepping, Watches, blind, march
+from .kernels.march import Matrices, Rates, Step, load_part
+from .kernels.sparse import product, subtract_transposed_product
 from .mesh import Floats
 from .state import Lanes, State
 
 MAX_HALVINGS = 6
 """A step is halved at most this often, down to dt/64."""
+
+
+Where = tuple[int, int]
+"""A step by its number, and what is next in it."""
+
+Seen = tuple[Watches, Account]
+"""What is read of the steps and what they are accounted for with."""
 
 
 @dataclass(frozen=True)
@@ -50,32 +59,36 @@ class Newmark:
         )
 
 
-@dataclass(frozen=True)
-class StepReport:
-    """Of one step, (LANES,): direct solves, relative residual (D9), the source's test, whether halved, whether that failed."""
-
-    rounds: np.ndarray
-    residual: Floats
-    source: Floats
-    halved: np.ndarray
-    failed: np.ndarray
-
-
 class Stepper:
     """K̂ = a0 M + a1 C + K, factorised and condensed, with the scratch arrays of a step."""
 
     def __init__(self, system: System, newmark: Newmark, rayleigh: Rayleigh) -> None:
         self.system, self.newmark, self.rayleigh = system, newmark, rayleigh
         self.rates = rates = newmark.rates(rayleigh)
-        effective = (rates.a0 + rates.a1 * rates.alpha) * system.M + (1 + rates.a1 * rates.beta) * system.K
-        self.condensed = Condensed(system, effective)
-        self._M: Rows = rows(system.M)
-        self._rhs: Floats = np.zeros((system.n_dof, LANES))
-        self._Mu: Floats = np.zeros((system.n_dof, LANES))
-        self._found: Contact = State.at_rest(system).contact
-        self._none: Floats = np.zeros_like(self._found.gap)  # dashpots where damping leaves the joints out
-        self._damping = _JointDampingCache(self) if rayleigh.joints and len(system.points) else None
+        M, K = system.M, system.K
+        self.condensed = Condensed(system, (rates.a0 + rates.a1 * rates.alpha) * M + (1 + rates.a1 * rates.beta) * K)
+        self.matrices = Matrices(rows(M), rows(rates.alpha * M + rates.beta * K), rows(K))
+        scratch = Step(*(np.zeros((system.n_dof, LANES)) for _ in Step._fields))
+        self.of = Stepping(
+            rates,
+            self.matrices,
+            self.condensed.of,
+            MAX_ROUNDS,
+            scratch,
+            State.at_rest(system).contact,
+            self.condensed.report,
+            self.condensed.clock,
+            np.zeros((2, LANES)),
+        )
+        self._blind = blind(system.n_dof, len(system.points))
+        self._none = dashpots(*(np.zeros((LANES, 2 * len(system.points))) for _ in range(2)))
+        self._dashpots = _JointDashpots(self) if rayleigh.joints and len(system.points) else None
         self._halved: dict[int, Stepper] = {}
+
+    @property
+    def alone(self) -> bool:
+        """Whether every step must be prepared by itself: the dashpots of joints are those of its start."""
+        return self._dashpots is not None
 
     def halved(self, times: int) -> "Stepper":
         """The stepper of dt/2^times, made once."""
@@ -85,72 +98,80 @@ class Stepper:
         return self._halved[times]
 
     def start(self, state: State, lanes: Lanes, ground: Floats) -> None:
-        """Complete a static state: images under M and K, and the first acceleration from (D4); velocities are zero."""
-        self.condensed.forget(slice(None))  # the factors may be those of other joints
+        """Complete a static state: the first acceleration from (D4), gaps from the displacements; velocities are zero."""
+        self.condensed.forget(slice(None))  # they may be those of other joints
         motion, contact = state.motion, state.contact
-        K = rows(self.system.K)
-        product(self._M, motion.u, motion.Mu)
-        product(K, motion.u, motion.Ku)
         x, y = self.system.inertia[:, :, None]
-        motion.Ma[:] = lanes.standing - (x * ground[0] + y * ground[1]) - motion.Ku
-        subtract_transposed_product(self.condensed.B, np.ascontiguousarray(contact.force.T), motion.Ma)
-        motion.a[:] = motion.Ma
+        Ku = np.zeros_like(motion.u)
+        product(self.matrices.K, motion.u, Ku)
+        motion.a[:] = lanes.standing - (x * ground[0] + y * ground[1]) - Ku
+        subtract_transposed_product(self.condensed.of.B, np.ascontiguousarray(contact.force.T), motion.a)
         solve(factorise(self.system.M, self.system.n_interior), motion.a)
-        product(K, motion.a, motion.Ka)
+        gap = np.zeros((contact.gap.shape[1], LANES))
+        product(self.condensed.of.B, motion.u, gap)
+        contact.gap[:] = gap.T  # to the last digits of u: a floating box was pushed far apart and back in the static stage
 
-    def step(self, state: State, lanes: Lanes, ground: Floats, ground_end: Floats) -> StepReport:
-        """Advance all lanes by dt; base acceleration (2, LANES) at start and end, linear between where a step is halved."""
-        failed = self._solve(state, lanes, ground_end)
-        before = {lane: state.alone(lane) for lane in np.flatnonzero(failed).tolist()}
-        self._commit(state, lanes, ground, ground_end)
-        solver, no = self.condensed, np.zeros(LANES, bool)
-        report = StepReport(solver.rounds.copy(), solver.residual.copy(), solver.source.copy(), no, no.copy())
+    def prepare(self, state: State, lanes: int | slice = slice(None)) -> None:
+        """Take over the motion of these lanes: what it leaves in the load of the next step."""
+        (u, v, a), (wu, wv, wa) = state.motion, load_part(self.rates)
+        self.of.step.w[:, lanes] = wu * u[:, lanes] + wv * v[:, lanes] + wa * a[:, lanes]
+
+    def dashpots(self, state: State, lanes: Lanes) -> Dashpots:
+        """Those of the joints in the step that starts from `state` (D5)."""
+        return self._dashpots.at(state, lanes) if self._dashpots else self._none
+
+    def march(self, where: Where, end: int, state: State, drive: Drive, pots: Dashpots, seen: Seen) -> Where:
+        """Do the steps up to `end`, not included, or up to where a lane needs help; see kernels.loop."""
+        watches, account = seen
+        return march(*where, end, self.of, drive, pots, watches, state.motion, state.contact, account)
+
+    def step(self, state: State, lanes: Lanes, ground: Floats, ground_end: Floats) -> np.ndarray:
+        """Advance all lanes by dt; base acceleration (2, LANES) at start and end, linear between where a step is halved.
+
+        (n_lane,) True where the step was halved; what it took is in self.of.report, rounds -1 where even that failed.
+        """
+        before = self.attempt(state, lanes, ground, ground_end)
         for lane, start in before.items():
-            report.halved[lane] = True
-            report.failed[lane] = not self._in_halves(state, lane, start, lanes, ground, ground_end, report)
-        return report
+            self.in_halves(state, lane, start, lanes, ground, ground_end)
+        return np.isin(np.arange(lanes.n_lane), list(before))
 
-    def _solve(self, state: State, lanes: Lanes, ground_end: Floats) -> np.ndarray:
-        loads = Loads(lanes.standing, self.system.inertia)
-        history(self.rates, loads, ground_end, state.motion, self._rhs)
-        damping = self._damping.at(state, lanes) if self._damping else None
-        return self.condensed.solve(self._rhs, lanes.law, lanes.n_lane, state.contact, self._found, damping)
+    def attempt(self, state: State, lanes: Lanes, ground: Floats, ground_end: Floats) -> dict[int, State]:
+        """A step of all lanes, their motion taken over first; the lanes in which it failed as they were before."""
+        self.prepare(state)
+        pots = self.dashpots(state, lanes)
+        path = np.stack([ground, ground_end, ground_end])  # not the last step of its march, so that no account is made up
+        drive = replace(lanes, ground=path).drive(self.system)
+        watches, account = self._blind
+        seen = watches, account._replace(energy=state.energy)
+        where, before = self.march((1, TO_SOLVE), 2, state, drive, pots, seen), {}
+        if where == (1, TO_COMMIT):
+            before = self.before_failure(state, lanes.n_lane)
+            self.march(where, 2, state, drive, pots, seen)
+        return before
 
-    def _commit(self, state: State, lanes: Lanes, ground: Floats, ground_end: Floats) -> None:
-        loads = Loads(lanes.standing, self.system.inertia)
-        product(self._M, self.condensed.u, self._Mu)
-        mean = 0.5 * (ground + ground_end)
-        commit(self.rates, loads, mean, self._rhs, self.condensed.u, self._Mu, state.motion, state.energy)
-        slope, offset = (self._damping.last.slope, self._damping.last.offset) if self._damping else (self._none, self._none)
-        commit_joints(lanes.law, slope, offset, lanes.n_lane, self._found, state.contact, state.energy)
+    def before_failure(self, state: State, n_lane: int) -> dict[int, State]:
+        """Copies of the lanes in which the step just solved has failed; it must not be committed yet."""
+        return {lane: state.alone(lane) for lane in np.flatnonzero(self.of.report.rounds[:n_lane] < 0).tolist()}
 
-    def _in_halves(
-        self, state: State, lane: int, start: State, lanes: Lanes, ground: Floats, ground_end: Floats, report: StepReport
-    ) -> bool:
-        """Repeat one lane's step in 2, 4, … 64 parts until all converge, and put the result back."""
+    def in_halves(self, state: State, lane: int, start: State, lanes: Lanes, ground: Floats, ground_end: Floats) -> bool:
+        """Repeat one lane's step in 2, 4, … 64 parts until all converge, and put the result and its report back."""
         alone = lanes.alone(lane)
         path = [np.zeros((2, LANES)), np.zeros((2, LANES))]
         path[0][:, 0], path[1][:, 0] = ground[:, lane], ground_end[:, lane]
         for times in range(1, MAX_HALVINGS + 1):
             stepper, trial, parts = self.halved(times), start.copy(), 2**times
-            stepper.condensed.forget(0)  # its factor may be another lane's
+            stepper.condensed.forget(0)  # its inverse may be another lane's
             at = [path[0] + (path[1] - path[0]) * i / parts for i in range(parts + 1)]
-            if all(stepper._part(trial, alone, *ends) for ends in pairwise(at)):
+            if not any(stepper.attempt(trial, alone, *ends) for ends in pairwise(at)):
                 state.put(lane, trial)
-                report.rounds[lane] = stepper.condensed.rounds[0]
-                report.residual[lane] = stepper.condensed.residual[0]
-                report.source[lane] = stepper.condensed.source[0]
+                self.prepare(state, lane)
+                for mine, theirs in zip(self.of.report, stepper.of.report, strict=True):
+                    mine[lane] = theirs[0]
                 return True
         return False
 
-    def _part(self, state: State, lanes: Lanes, ground: Floats, ground_end: Floats) -> bool:
-        if self._solve(state, lanes, ground_end).any():
-            return False
-        self._commit(state, lanes, ground, ground_end)
-        return True
 
-
-class _JointDampingCache:
+class _JointDashpots:
     """The dashpots beta k of the joints (D5): affine in g, their states those of the start of the step, frozen within it."""
 
     def __init__(self, stepper: Stepper) -> None:
@@ -159,18 +180,16 @@ class _JointDampingCache:
         self._pattern = np.full((LANES, m), -1.0)
         self._T, self._G = np.zeros((LANES, m, m)), np.zeros((LANES, m, m))
         self._rate: Floats = np.zeros((m, LANES))
-        self.last = JointDamping(np.zeros((LANES, m)), np.zeros((LANES, m)), self._T, self._G)
 
-    def at(self, state: State, lanes: Lanes) -> JointDamping:
+    def at(self, state: State, lanes: Lanes) -> Dashpots:
         """Dashpots of the step that starts from `state`."""
         rates, contact, motion = self._stepper.rates, state.contact, state.motion
         acting = np.stack([contact.state != OPEN, contact.state == STICK], axis=2).reshape(LANES, -1)
         c = rates.beta * acting * np.stack([lanes.law.k_n, lanes.law.k_s], axis=2).reshape(LANES, -1)
-        product(self._stepper.condensed.B, rates.a4 * motion.v + rates.a5 * motion.a, self._rate)
+        product(self._stepper.condensed.of.B, rates.a4 * motion.v + rates.a5 * motion.a, self._rate)
         slope = rates.a1 * c
         self._eliminate(slope, lanes.n_lane)
-        self.last = JointDamping(slope, -c * (rates.a1 * contact.gap + self._rate.T), self._T, self._G)
-        return self.last
+        return dashpots(slope, -c * (rates.a1 * contact.gap + self._rate.T), self._T, self._G)
 
     def _eliminate(self, slope: Floats, n_lane: int) -> None:
         """T and T G of the lanes whose dashpots have changed."""

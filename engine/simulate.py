@@ -7,10 +7,12 @@ from enum import IntEnum
 import numpy as np
 
 from .assembly import System
+from .kernels.condense import Dashpots
 from .kernels.jit import LANES
-from .kernels.march import JOINT_ELASTIC, STRAIN, audit
-from .mesh import Flags, Floats
-from .newmark import Stepper, StepReport
+from .kernels.loop import TO_COMMIT, TO_SOLVE, TO_WATCH, Account, Watches
+from .kernels.march import JOINT_ELASTIC, Start
+from .mesh import Floats
+from .newmark import Stepper, Where
 from .recorder import Recorder
 from .sections import SectionForces
 from .state import Lanes, State
@@ -19,6 +21,9 @@ from .watch import JointWatch, SectionWatch, ValueWatch
 
 RESOLVED = 1e-3
 """The account is read against at least this part of what the static stage stored: 1e-9 of it is the rounding of that store."""
+
+STEPS_A_TIME = 100
+"""Steps between two calls of `progress`."""
 
 OPENING, SLIP, PRESSURE, PENETRATION = range(4)
 """Rows of Response.joint_peaks."""
@@ -73,6 +78,7 @@ class Response:
     shape : (n_lane, n_node, 2) displacement at the moment of the largest racking, shape_time : (n_lane,) [s],
     shape_state : (n_lane, n_point) joint states then
     iterations, residual, source_test, energy_error, contact_drift : (n_lane,)
+    clock : (len(PHASES),) ticks of the processor's counter that each phase of the steps took, all zero where it cannot be read
     """
 
     recorder: Recorder
@@ -104,6 +110,7 @@ class Response:
     source_test: Floats
     energy_error: Floats
     contact_drift: Floats
+    clock: np.ndarray
 
 
 def simulate(
@@ -128,14 +135,16 @@ def simulate(
     run.settle(static_loads, first_frequency)
     if trace is not None and run.alive[0]:
         trace(run.traced(0))
-    for step in range(1, len(lanes.ground)):
-        report = run.advance(step)
-        if trace is not None and run.alive[0]:
-            trace(run.traced(step, report))
-        if progress is not None and step % 100 == 0:
-            progress(step)
+    n_step, a_time = len(lanes.ground) - 1, 1 if trace is not None else STEPS_A_TIME
+    for first in range(1, n_step + 1, a_time):
         if not run.alive.any():
             break
+        last = min(first + a_time - 1, n_step)
+        run.advance(first, last + 1)
+        if trace is not None and run.alive[0]:
+            trace(run.traced(last))
+        if progress is not None and last % STEPS_A_TIME == 0:
+            progress(last)
     response = run.response()
     if throw and (response.status >= Status.NOT_CONVERGED).any():
         lane = int(np.argmax(response.status >= Status.NOT_CONVERGED))
@@ -155,10 +164,9 @@ class _Run:
         self.values = ValueWatch(self.system, self.n_kept)
         self.joints = JointWatch(self.system, lanes, self.n_kept)
         self.sections = SectionWatch(sections, stepper.rayleigh, lanes, self.n_kept)
-        self.iterations: Floats = np.zeros(LANES)
-        self.residual: Floats = np.zeros(LANES)
-        self.source_test: Floats = np.zeros(LANES)
-        self.account: Floats = np.zeros((3, LANES))
+        self.watches = Watches(self.values.of, self.joints.of, self.sections.of, every, stepper.newmark.dt)
+        self.drive = self.lanes.drive(self.system)
+        self.halved = np.zeros(LANES, dtype=bool)
         self.status = np.full(LANES, Status.NOT_RUN, dtype=np.int64)
         self.status[: lanes.n_lane] = Status.DONE
         self.reason = [""] * LANES
@@ -174,77 +182,82 @@ class _Run:
         for lane in np.flatnonzero(self.alive & ~found):
             self._drop(int(lane), Status.NO_EQUILIBRIUM, "no static equilibrium: nothing holds the box under these loads")
         self.stepper.start(self.state, self.lanes, self.lanes.ground[0])
-        motion, contact = self.state.motion, self.state.contact
-        force = contact.force.reshape(LANES, -1, 2)
-        stiffness = np.stack([self.lanes.law.k_n, self.lanes.law.k_s], axis=2)
-        self.start_energy = np.stack([0.5 * (motion.u * motion.Ku).sum(axis=0), 0.5 * (force**2 / stiffness).sum(axis=(1, 2))])
-        self.state.energy[STRAIN], self.state.energy[JOINT_ELASTIC] = self.start_energy
+        self.account = self._account()
         self.values.begin(self.state)
         self.joints.begin(self.state)
-        self._see(0)
+        for array in self.stepper.of.report:
+            array[:] = 0  # what a stepper found in another march is not this one's
+        self._march((0, TO_WATCH), 1, self.stepper.dashpots(self.state, self.lanes))
+        self.stepper.prepare(self.state)
 
-    def traced(self, step: int, report: StepReport | None = None) -> Trace:
-        """What the first lane did in a step; without a report, what it is before the first one."""
-        found = (int(report.rounds[0]), float(report.residual[0]), bool(report.halved[0])) if report else (0, 0.0, False)
+    def _account(self) -> Account:
+        """The energy account of the state at t = 0."""
+        u, contact, law = self.state.motion.u.copy(), self.state.contact, self.lanes.law
+        Ku = self.system.K @ u
+        stiffness = np.stack([law.k_n, law.k_s], axis=2)
+        elastic = 0.5 * (contact.force.reshape(LANES, -1, 2) ** 2 / stiffness).sum(axis=(1, 2))
+        self.state.energy[JOINT_ELASTIC] = elastic
+        start = Start(u, Ku, 0.5 * (u * Ku).sum(axis=0), elastic)
+        return Account(self.state.energy, start, np.zeros((3, LANES)), np.zeros((3, LANES)))
+
+    def traced(self, step: int) -> Trace:
+        """What the first lane did in a step that was advanced alone, or what it is before the first one."""
+        report = self.stepper.of.report
+        found = (int(report.rounds[0]), float(report.residual[0]), bool(self.halved[0])) if step else (0, 0.0, False)
         return Trace(step, step * self.stepper.newmark.dt, self.state.contact.state[0].copy(), *found)
 
-    def advance(self, step: int) -> StepReport:
-        """One step of all lanes and what is read from it."""
-        ground = self.lanes.ground
-        report = self.stepper.step(self.state, self.lanes, ground[step - 1], ground[step])
-        self._judge(step, report)
-        audit(self.state.energy, self.start_energy, self.account)
-        self._see(step)
-        return report
+    def advance(self, first: int, end: int) -> None:
+        """The steps from `first` up to `end`, not included, of all lanes, and what is read from them."""
+        where = first, TO_SOLVE
+        while where[0] < end:
+            self.halved[:] = False
+            pots = self.stepper.dashpots(self.state, self.lanes)
+            where = self._march(where, where[0] + 1 if self.stepper.alone else end, pots)
+            if where[1] != TO_SOLVE:
+                self._attend(where, pots)
+                where = self._march((where[0], TO_WATCH), where[0] + 1, pots)
 
-    def _judge(self, step: int, report: StepReport) -> None:
-        n = self.lanes.n_lane
-        np.maximum(self.iterations[:n], report.rounds[:n], out=self.iterations[:n])
-        np.maximum(self.residual[:n], report.residual[:n], out=self.residual[:n])
-        np.maximum(self.source_test[:n], report.source[:n], out=self.source_test[:n])
+    def _march(self, where: Where, end: int, pots: Dashpots) -> Where:
+        return self.stepper.march(where, end, self.state, self.drive, pots, (self.watches, self.account))
+
+    def _attend(self, where: Where, pots: Dashpots) -> None:
+        """Lanes that failed in a step, which is not committed yet, are halved or dropped; so are those no longer finite."""
+        step, ground = where[0], self.lanes.ground
+        before: dict[int, State] = {}
+        if where[1] == TO_COMMIT:
+            before = self.stepper.before_failure(self.state, self.lanes.n_lane)
+            self._march(where, step + 1, pots)
         time = step * self.stepper.newmark.dt
-        finite: Flags = np.asarray(np.isfinite(self.state.energy).all(axis=0))
-        if finite[:n].all() and not report.halved.any():
-            return
-        for lane in np.flatnonzero(self.alive):
-            if report.failed[lane] and not np.isnan(report.residual[lane]):
-                text = f"joint states not found at t = {time:g} s, down to a step of dt/64; residual {report.residual[lane]:.1e}"
-                self._drop(int(lane), Status.NOT_CONVERGED, text)
-            elif report.failed[lane] or not finite[lane]:
-                self._drop(int(lane), Status.NON_FINITE, f"a value is no longer finite at t = {time:g} s")
-            elif report.halved[lane]:
+        for lane, start in before.items():
+            self.halved[lane] = True
+            if self.stepper.in_halves(self.state, lane, start, self.lanes, ground[step - 1], ground[step]):
                 self.status[lane] = Status.SUBSTEPS
+                continue
+            residual = self.stepper.of.report.residual[lane]
+            if np.isnan(residual):
+                self._drop(lane, Status.NON_FINITE, f"a value is no longer finite at t = {time:g} s")
+            else:
+                text = f"joint states not found at t = {time:g} s, down to a step of dt/64; residual {residual:.1e}"
+                self._drop(lane, Status.NOT_CONVERGED, text)
+        for lane in np.flatnonzero(self.alive & ~np.isfinite(self.state.energy).all(axis=0)).tolist():
+            self._drop(lane, Status.NON_FINITE, f"a value is no longer finite at t = {time:g} s")
 
     def _drop(self, lane: int, status: Status, reason: str) -> None:
         """Take a lane out: its state becomes zero so that nothing non-finite marches on."""
         self.status[lane], self.reason[lane] = status, reason
         self.state.put(lane, State.at_rest(self.system))
+        self.stepper.prepare(self.state, lane)
         self.lanes.standing[:, lane] = 0.0
         self.lanes.ground[:, :, lane] = 0.0
-
-    def _see(self, step: int) -> None:
-        time = step * self.stepper.newmark.dt
-        self.values.see(time, self.state)
-        self.joints.see(time, self.state)
-        self.sections.see(time, self.state, self.lanes.ground[step])
-        if step % self.every == 0:
-            row = step // self.every
-            self.values.keep(row)
-            self.joints.keep(row, self.state)
-            self.sections.keep(row)
 
     def response(self) -> Response:
         """Everything seen and kept, lane first, with failed lanes emptied."""
         n = self.lanes.n_lane
-        scale = np.maximum(self.account[2], RESOLVED * self.start_energy.sum(axis=0))
+        imbalance, drift, terms = self.account.worst
+        scale = np.maximum(terms, RESOLVED * (self.account.start.strain + self.account.start.joints))
         scale[scale == 0.0] = 1.0
-        own = {
-            "iterations": self.iterations,
-            "residual": self.residual,
-            "source_test": self.source_test,
-            "energy_error": self.account[0] / scale,
-            "contact_drift": self.account[1] / scale,
-        }
+        own = dict(zip(("iterations", "residual", "source_test"), self.account.largest, strict=True))
+        own |= {"energy_error": imbalance / scale, "contact_drift": drift / scale}
         found = {
             name: array[:n].copy()
             for name, array in (self.values.found() | self.joints.found() | self.sections.found() | own).items()
@@ -256,5 +269,6 @@ class _Run:
             time=self.stepper.newmark.dt * self.every * np.arange(self.n_kept, dtype=float),
             status=self.status[:n].copy(),
             reason=tuple(self.reason[:n]),
+            clock=self.stepper.of.clock.copy(),
             **found,
         )

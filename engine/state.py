@@ -7,7 +7,8 @@ import numpy as np
 
 from .assembly import System
 from .kernels.jit import LANES
-from .kernels.march import Contact, Motion
+from .kernels.loop import Drive
+from .kernels.march import Contact, Loads, Motion
 from .kernels.states import Law
 from .mesh import Floats
 
@@ -92,6 +93,10 @@ class Lanes:
         for lane, part in enumerate(behind_sections):
             behind[:, lane] = part
         return cls(loads, law, motions, len(standing), behind)
+
+    def drive(self, system: System) -> Drive:
+        """As the kernels take it."""
+        return Drive(Loads(self.standing, system.inertia), self.law, self.ground, self.n_lane)
 
     def alone(self, lane: int) -> "Lanes":
         """One lane by itself, without its motion."""

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from .assembly import System, rows
-from .condensed import Condensed, take_solution
+from .kernels.condense import take_solution
 from .kernels.jit import LANES
 from .kernels.march import commit_joints
 from .kernels.sparse import product
 from .mesh import Floats
+from .newmark import Newmark, Rayleigh, Stepper
 from .state import Lanes, State
 
 LOAD_STEPS = 10
@@ -39,13 +40,13 @@ def equilibrium(system: System, lanes: Lanes, loads: list[Floats], first_frequen
 
 
 class _Proximal:
-    """Steps (K + eta M) u⁺ + B_jᵀ lambda(B_j u⁺) = R + eta M u."""
+    """Steps (K + eta M) u⁺ + B_jᵀ lambda(B_j u⁺) = R + eta M u: Newmark's without damping, from rest, 2/sqrt(eta) long."""
 
     def __init__(self, system: System, eta: float) -> None:
         self.eta = eta
         self._M = rows(system.M)
-        self._condensed = Condensed(system, system.K + eta * system.M)
-        self._found = State.at_rest(system).contact
+        self._stepper = Stepper(system, Newmark(2 / np.sqrt(eta)), Rayleigh())
+        self._next = State.at_rest(system)
         self._inertia: Floats = np.zeros((system.n_dof, LANES))
 
     def settle(self, state: State, lanes: Lanes, active: np.ndarray) -> np.ndarray:
@@ -60,7 +61,7 @@ class _Proximal:
         for _ in range(MAX_ITERATIONS):
             if not moving.any():
                 break
-            change, failed = self._iterate(trial, state, lanes, moving)
+            change, failed = self._iterate(trial, lanes, moving)
             lost |= moving & failed
             moving &= ~(failed | (change <= TOLERANCE * scale))
         state.motion.u[:, active] = trial.motion.u[:, active]
@@ -68,15 +69,16 @@ class _Proximal:
         commit_joints(lanes.law, none, none, lanes.n_lane, trial.contact, state.contact, state.energy)
         return ~(lost | moving)
 
-    def _iterate(self, trial: State, state: State, lanes: Lanes, moving: np.ndarray) -> tuple[Floats, np.ndarray]:
-        """One proximal step of the lanes that move; norm of eta M (u⁺ - u), and where the joint solve failed."""
-        product(self._M, trial.motion.u, self._inertia)
-        rhs = lanes.standing + self.eta * self._inertia
+    def _iterate(self, trial: State, lanes: Lanes, moving: np.ndarray) -> tuple[Floats, np.ndarray]:
+        """One proximal step of the lanes that move, their slip as it was; norm of eta M (u⁺ - u), and where it failed."""
+        following, rest = self._next, np.zeros((2, LANES))
+        for mine, theirs in zip((*following.motion, *following.contact), (*trial.motion, *trial.contact), strict=True):
+            mine[:] = theirs
         failed = np.zeros(LANES, dtype=bool)
-        start = trial.contact._replace(slip=state.contact.slip)
-        failed[: lanes.n_lane] = self._condensed.solve(rhs, lanes.law, lanes.n_lane, start, self._found)
-        step = self._condensed.u - trial.motion.u
-        trial.motion.u[:, moving] = self._condensed.u[:, moving]
-        take_solution(trial.contact, self._found, moving)
+        failed[list(self._stepper.attempt(following, lanes, rest, rest))] = True
+        step = following.motion.u - trial.motion.u
+        trial.motion.u[:, moving] = following.motion.u[:, moving]
+        for lane in np.flatnonzero(moving[: lanes.n_lane]).tolist():
+            take_solution(trial.contact, following.contact, lane)
         product(self._M, step, self._inertia)
         return self.eta * np.linalg.norm(self._inertia, axis=0), failed

@@ -1,6 +1,6 @@
 """The condensed joint solve of one lane (D9): g + G lambda(g) = g_free with the law of `joint` at every point.
 
-The states of the last step are tried first, with the factor kept from then. Where a state does not hold,
+The states of the last step are tried first, with the inverse kept from then. Where a state does not hold,
 the solution itself says what comes next (a Newton step on the states); Newton can cycle, so every second time block Gauss-Seidel
 sweeps propose states instead: by turns from the direct solution brought back onto the law, which has the rigid motions right,
 and on from the last sweep, which cannot cycle; twice as many sweeps each time. What is not found in ten rounds is followed
@@ -11,6 +11,7 @@ import numpy as np
 
 from .direct import EQUATION_TOLERANCE, direct
 from .follow import follow
+from .inverse import Inverse
 from .jit import kernel, summing_kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
 from .states import Kept, Points
@@ -20,6 +21,7 @@ STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep
 NEWTON_ROUNDS = 2  # direct solves between sweeps
 FOLLOW_AFTER = 10  # direct solves before the path is followed
 FIRST_SWEEPS = 8  # sweeps of the first time, doubled every time
+QUIET = 2  # sweeps without another state, after which more of them are not worth their while
 
 
 @kernel
@@ -54,12 +56,22 @@ def _revise(points, g, lam, g_tol, lam_tol, state):
 
 
 @kernel
-def _project(force, mu, swept):
-    """Forces brought back onto the law's cone (D3), for sweeps to start from."""
+def _move(G, p, normal, tangential, force, Gl):
+    """Give point p other forces, and G lambda what follows."""
+    n, s = 2 * p, 2 * p + 1
+    more_n, more_s = normal - force[n], tangential - force[s]
+    force[n], force[s] = normal, tangential
+    if more_n != 0.0 or more_s != 0.0:
+        for j in range(Gl.shape[0]):
+            Gl[j] += more_n * G[n, j] + more_s * G[s, j]
+
+
+@kernel
+def _project(G, mu, force, Gl):
+    """Bring forces back onto the law's cone (D3), for sweeps to start from; G lambda goes along."""
     for p in range(mu.shape[0]):
         normal = min(force[2 * p], 0.0)
-        swept[2 * p] = normal
-        swept[2 * p + 1] = max(mu[p] * normal, min(-mu[p] * normal, force[2 * p + 1]))
+        _move(G, p, normal, max(mu[p] * normal, min(-mu[p] * normal, force[2 * p + 1])), force, Gl)
 
 
 @summing_kernel
@@ -77,21 +89,30 @@ def _rounding(G, g_free, lam, product):
     return 0.0 if scale == 0.0 else lam.shape[0] * UNIT_ROUNDOFF * np.sqrt(total / scale)
 
 
-@summing_kernel
-def _sweep(points, g_free, lam, proposal):
-    """One block Gauss-Seidel sweep over the points: lam and the proposed states are updated in place."""
-    G = points.G
+@kernel
+def _sweep(points, g_free, lam, Gl, proposal):
+    """One block Gauss-Seidel sweep over the points: lam, G lambda and the proposed states; whether no state has changed."""
+    G, quiet = points.G, True
     for p in range(proposal.shape[0]):
         n, s = 2 * p, 2 * p + 1
-        r_n, r_s = g_free[n], g_free[s]
-        for j in range(lam.shape[0]):
-            r_n -= G[n, j] * lam[j]
-            r_s -= G[s, j] * lam[j]
-        r_n += G[n, n] * lam[n] + G[n, s] * lam[s]
-        r_s += G[s, n] * lam[n] + G[s, s] * lam[s]
+        r_n = g_free[n] - Gl[n] + G[n, n] * lam[n] + G[n, s] * lam[s]
+        r_s = g_free[s] - Gl[s] + G[s, n] * lam[n] + G[s, s] * lam[s]
         slip, k_n, k_s, mu = points.slip[p], points.k_n[p], points.k_s[p], points.mu[p]
-        code, lam[n], lam[s] = balance(G[n, n], G[n, s], G[s, s], r_n, r_s, slip, k_n, k_s, mu)
+        code, normal, tangential = balance(G[n, n], G[n, s], G[s, s], r_n, r_s, slip, k_n, k_s, mu)
+        quiet = quiet and proposal[p] == code
         proposal[p] = np.int8(code)
+        _move(G, p, normal, tangential, lam, Gl)
+    return quiet
+
+
+@kernel
+def _sweep_on(points, g_free, lam, Gl, proposal, most):
+    """Sweeps until the states have stood still for QUIET of them, `most` at most."""
+    quiet = 0
+    for _ in range(most):
+        quiet = quiet + 1 if _sweep(points, g_free, lam, Gl, proposal) else 0
+        if quiet == QUIET:
+            return
 
 
 @kernel
@@ -109,7 +130,8 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     Returns (rounds, residual): how many direct solves it took, -1 where `max_rounds` did not do, and the relative residual.
     """
     points = Points(G, law.k_n[lane], law.k_s[lane], law.mu[lane], slip)
-    kept = Kept(work.lu[lane], work.pivot[lane], work.factored[lane], work.unknown, work.product, work.change)
+    inverse = Inverse(work.matrix[lane], work.unknown[lane], work.place[lane], work.tie[lane], work.state[lane], work.size[lane])
+    kept = Kept(inverse, work.work, work.x, work.answer, work.product, work.missing)
     proposal, g_tol = work.proposal, STATE_TOLERANCE * _largest(g_free)
     work.swept[:] = lam
     proposal[:] = state
@@ -129,9 +151,10 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
             follow(points, kept, work, g_free, proposal, g, lam)
         elif attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
             if attempt % (2 * NEWTON_ROUNDS) != 0:
-                _project(lam, points.mu, work.swept)
-            for _ in range(sweeps):
-                _sweep(points, g_free, work.swept, proposal)
+                work.swept[:] = lam
+                work.swept_product[:] = work.product
+                _project(G, points.mu, work.swept, work.swept_product)
+            _sweep_on(points, g_free, work.swept, work.swept_product, proposal, sweeps)
             sweeps *= 2
     return -1, residual
 

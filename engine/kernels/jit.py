@@ -66,6 +66,11 @@ def summing_kernel(function: Callable) -> Callable:
     return _compiled(function, FLAGS | {"fastmath": SUMMING})
 
 
+def inlined_kernel(function: Callable) -> Callable:
+    """A `kernel` that becomes part of the one that calls it: an outer one else takes all below it through the compiler again."""
+    return _compiled(function, FLAGS | {"inline": "always"})
+
+
 def _compiled(function: Callable, flags: dict[str, Any]) -> Callable:
     """numba fixes the cache's folder when it decorates: its setting is changed for that moment, other packages keep theirs."""
     config: Any = numba.config

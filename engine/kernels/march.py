@@ -1,19 +1,21 @@
-"""One Newmark step of all lanes (D4, D6–D8): history terms, commit, energies (D11).
+"""One Newmark step of all lanes (D4, D6–D8): effective load, commit, energies (D11).
 
-The Newmark update is linear, so the images of u, v, a under M and K obey the recursion of u, v, a themselves. They are
-carried along: history terms and energies then need no product with M or K, and a step needs M u alone.
+The unknown is y = u⁺ - q, with q = beta (a1 u + a4 v + a5 a) / (1 + a1 beta): then u⁺ + beta v⁺ = (1 + a1 beta) y, and the step
+is K̂ y = R⁺ - B_jᵀ lambda⁺ + M w with w a combination of u, v, a. No product with K is formed and one with M (D8).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .contact import solve_lane, source_test
 from .jit import LANES, kernel
 from .joint import slip_after
+from .sparse import Rows
+from .vector import load, plus_product, store, zeros
 
 INPUT, KINETIC, STRAIN, DAMPING, JOINT, JOINT_ELASTIC, FRICTION, JOINT_DAMPING = range(8)
-"""Rows of the energy account: work of the loads, stored, stored, dissipated, work of the joints and what it consists of."""
+"""Rows of the energy account: work of the loads, stored, stored since the static stage, dissipated, work of the joints and what
+it consists of."""
 
 
 class Rates(NamedTuple):
@@ -30,17 +32,11 @@ class Rates(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Displacement, velocity and acceleration relative to the base with their images under M and K, each (n_dof, LANES)."""
+    """Displacement, velocity and acceleration relative to the base, each (n_dof, LANES)."""
 
     u: np.ndarray
     v: np.ndarray
     a: np.ndarray
-    Mu: np.ndarray
-    Mv: np.ndarray
-    Ma: np.ndarray
-    Ku: np.ndarray
-    Kv: np.ndarray
-    Ka: np.ndarray
 
 
 class Contact(NamedTuple):
@@ -62,47 +58,110 @@ class Loads(NamedTuple):
     inertia: np.ndarray
 
 
+class Matrices(NamedTuple):
+    """M, C = alpha M + beta K and K of the free degrees of freedom."""
+
+    M: Rows
+    C: Rows
+    K: Rows
+
+
+class Step(NamedTuple):
+    """Arrays (n_dof, LANES) of a step: y, then the displacement it brings; w of the next load; mean velocity; scratch."""
+
+    y: np.ndarray
+    w: np.ndarray
+    mean: np.ndarray
+    change: np.ndarray
+
+
+class Start(NamedTuple):
+    """At the end of the static stage: u and K u (n_dof, LANES), strain energy and elastic joint energy (LANES,)."""
+
+    u: np.ndarray
+    Ku: np.ndarray
+    strain: np.ndarray
+    joints: np.ndarray
+
+
 @kernel
-def history(rates, loads, ground, motion, rhs):
-    """Fill rhs (n_dof, LANES), the effective load (D6–D8) for base acceleration `ground` (2, LANES) at the end of the step."""
-    alpha, beta = rates.alpha, rates.beta
+def _row_product(A, i, x):
+    """Row i of A times x (n, LANES)."""
+    total = zeros()
+    for k in range(A.indptr[i], A.indptr[i + 1]):
+        total = plus_product(total, A.values[k], load(x, A.indices[k]))
+    return total
+
+
+@kernel
+def known_part(rates):
+    """Factors of u, v, a in q, the part of u⁺ that is known before the step."""
+    share = rates.beta / (1.0 + rates.a1 * rates.beta)
+    return share * rates.a1, share * rates.a4, share * rates.a5
+
+
+@kernel
+def load_part(rates):
+    """Factors of u, v, a in w, which M takes to what they leave in the load of the next step."""
+    alpha, (q0, q1, q2) = rates.alpha, known_part(rates)
     m0, m1, m2 = rates.a0 + alpha * rates.a1, rates.a2 + alpha * rates.a4, rates.a3 + alpha * rates.a5
-    k0, k1, k2 = beta * rates.a1, beta * rates.a4, beta * rates.a5
-    for i in range(rhs.shape[0]):
-        rx, ry = loads.inertia[0, i], loads.inertia[1, i]
-        for c in range(LANES):
-            rhs[i, c] = (
-                loads.standing[i, c]
-                - (rx * ground[0, c] + ry * ground[1, c])
-                + (m0 * motion.Mu[i, c] + m1 * motion.Mv[i, c] + m2 * motion.Ma[i, c])
-                + (k0 * motion.Ku[i, c] + k1 * motion.Kv[i, c] + k2 * motion.Ka[i, c])
-            )
+    return m0 * (1.0 - q0), m1 - m0 * q1, m2 - m0 * q2
 
 
 @kernel
-def solve_joints(G, gap_free, law, n_lane, max_rounds, work, slip, found, rounds, residual, source):
-    """Joint solve of every lane, starting from the gaps, forces and states in `found`, which receives the solution.
+def effective_load(M, loads, ground, w, y):
+    """Fill y (n_dof, LANES) by R - M r a_ground + M w for base acceleration `ground` (2, LANES) at the end of the step."""
+    gx, gy = load(ground, 0), load(ground, 1)
+    for i in range(y.shape[0]):
+        total = plus_product(load(loads.standing, i), -loads.inertia[0, i], gx)
+        total = plus_product(total, -loads.inertia[1, i], gy)
+        store(y, i, plus_product(total, 1.0, _row_product(M, i, w)))
 
-    G (1 or LANES, m, m) is the flexibility of all lanes or of each; gap_free (m, LANES); rounds, residual, source (LANES,).
-    A lane that did not converge has rounds -1.
+
+@kernel
+def known_displacement(rates, motion, first, q):
+    """Fill q (n_dof, LANES) from degree of freedom `first` on."""
+    qu, qv, qa = known_part(rates)
+    for i in range(first, q.shape[0]):
+        total = plus_product(zeros(), qu, load(motion.u, i))
+        store(q, i, plus_product(plus_product(total, qv, load(motion.v, i)), qa, load(motion.a, i)))
+
+
+@kernel
+def commit(rates, matrices, loads, ground, motion, step, energy):
+    """Advance all lanes to the end of the step that step.y solves, and account for the work of loads and damping (D11).
+
+    `ground` is the mean base acceleration of the step; `energy` (8, LANES).
     """
-    for lane in range(n_lane):
-        for i in range(gap_free.shape[0]):
-            work.free[i] = gap_free[i, lane]
-            work.start[i] = found.gap[lane, i]
-        rounds[lane], residual[lane] = solve_lane(
-            G[lane if G.shape[0] > 1 else 0],
-            work.free,
-            law,
-            lane,
-            slip[lane],
-            found.state[lane],
-            found.gap[lane],
-            found.force[lane],
-            work,
-            max_rounds,
-        )
-        source[lane] = source_test(found.gap[lane], work.free, work)
+    _advance(rates, loads, ground, motion, step, energy)
+    C, work = matrices.C, load(energy, DAMPING)
+    for i in range(step.y.shape[0]):
+        work = plus_product(work, _row_product(C, i, step.mean), load(step.y, i))
+    store(energy, DAMPING, work)
+
+
+@kernel
+def _advance(rates, loads, ground, motion, step, energy):
+    """u, v, a at the end of the step (D6); step.y becomes the displacement in it, step.mean mean velocity, step.w the next w."""
+    qu, qv, qa = known_part(rates)
+    wu, wv, wa = load_part(rates)
+    gx, gy = load(ground, 0), load(ground, 1)
+    work = load(energy, INPUT)
+    for i in range(step.y.shape[0]):
+        u, v, a = load(motion.u, i), load(motion.v, i), load(motion.a, i)
+        new = plus_product(plus_product(plus_product(load(step.y, i), qu, u), qv, v), qa, a)
+        moved = plus_product(new, -1.0, u)
+        velocity = plus_product(plus_product(plus_product(zeros(), rates.a1, moved), -rates.a4, v), -rates.a5, a)
+        acceleration = plus_product(plus_product(plus_product(zeros(), rates.a0, moved), -rates.a2, v), -rates.a3, a)
+        store(motion.u, i, new)
+        store(motion.v, i, velocity)
+        store(motion.a, i, acceleration)
+        store(step.y, i, moved)
+        store(step.mean, i, plus_product(plus_product(zeros(), 0.5, velocity), 0.5, v))
+        store(step.w, i, plus_product(plus_product(plus_product(zeros(), wu, new), wv, velocity), wa, acceleration))
+        force = plus_product(load(loads.standing, i), -loads.inertia[0, i], gx)
+        work = plus_product(work, plus_product(force, -loads.inertia[1, i], gy), moved)
+    store(energy, INPUT, work)
 
 
 @kernel
@@ -134,55 +193,37 @@ def commit_joints(law, slope, offset, n_lane, found, contact, energy):
 
 
 @kernel
-def _newmark(rates, x, dx, ddx, new, c, i):
-    """Advance one entry of (x, v, a) to `new` (D6); v at the end and its mean over the step are returned."""
-    step = new - x[i, c]
-    v = rates.a1 * step - rates.a4 * dx[i, c] - rates.a5 * ddx[i, c]
-    a = rates.a0 * step - rates.a2 * dx[i, c] - rates.a3 * ddx[i, c]
-    mean = 0.5 * (v + dx[i, c])
-    x[i, c], dx[i, c], ddx[i, c] = new, v, a
-    return mean
+def _kinetic(M, v, result):
+    """result = 1/2 vᵀ M v of every lane: v (n, LANES), result (1, LANES)."""
+    total = zeros()
+    for i in range(v.shape[0]):
+        total = plus_product(total, _row_product(M, i, v), load(v, i))
+    store(result, 0, plus_product(zeros(), 0.5, total))
 
 
 @kernel
-def commit(rates, loads, ground, rhs, u, Mu, motion, energy):
-    """Advance all lanes to the displacement u (n_dof, LANES) and account for the work done on the way (D11).
-
-    `rhs` is the effective load with the joint forces taken off, so Ku follows from it without a product (D8). `ground` is the
-    mean base acceleration of the step. `energy` (8, LANES).
-    """
-    alpha, beta = rates.alpha, rates.beta
-    mass_part, factor = rates.a0 + rates.a1 * alpha, 1.0 / (1.0 + rates.a1 * beta)
-    for c in range(LANES):
-        energy[KINETIC, c] = energy[STRAIN, c] = 0.0
+def _strain_change(K, u, start, change, result):
+    """result (1, LANES) = 1/2 uᵀ K u less what it was at the start, from the difference of u: that is not lost in rounding."""
     for i in range(u.shape[0]):
-        rx, ry = loads.inertia[0, i], loads.inertia[1, i]
-        for c in range(LANES):
-            step = u[i, c] - motion.u[i, c]
-            Ku = (rhs[i, c] - mass_part * Mu[i, c]) * factor
-            _newmark(rates, motion.u, motion.v, motion.a, u[i, c], c, i)
-            mean_Mv = _newmark(rates, motion.Mu, motion.Mv, motion.Ma, Mu[i, c], c, i)
-            mean_Kv = _newmark(rates, motion.Ku, motion.Kv, motion.Ka, Ku, c, i)
-            load = loads.standing[i, c] - (rx * ground[0, c] + ry * ground[1, c])
-            energy[INPUT, c] += load * step
-            energy[DAMPING, c] += step * (alpha * mean_Mv + beta * mean_Kv)
-            energy[KINETIC, c] += 0.5 * motion.v[i, c] * motion.Mv[i, c]
-            energy[STRAIN, c] += 0.5 * motion.u[i, c] * motion.Ku[i, c]
+        store(change, i, plus_product(load(u, i), -1.0, load(start.u, i)))
+    total = zeros()
+    for i in range(u.shape[0]):
+        force = plus_product(load(start.Ku, i), 0.5, _row_product(K, i, change))
+        total = plus_product(total, force, load(change, i))
+    store(result, 0, total)
 
 
 @kernel
-def audit(energy, start, account):
-    """Keep the worst of the energy balance (D11): account (3, LANES) = largest imbalance, contact drift, sum of absolute terms.
-
-    start : (2, LANES) strain energy and elastic joint energy at the end of the static stage
-    """
+def audit(matrices, motion, start, change, energy, worst):
+    """Keep the worst of the energy balance (D11): worst (3, LANES) = largest imbalance, contact drift, sum of absolute terms."""
+    _kinetic(matrices.M, motion.v, energy[KINETIC : KINETIC + 1])
+    _strain_change(matrices.K, motion.u, start, change, energy[STRAIN : STRAIN + 1])
     for c in range(LANES):
-        stored = energy[KINETIC, c] + energy[STRAIN, c] - start[0, c]
-        released = energy[DAMPING, c] + energy[JOINT, c]
-        elastic = energy[JOINT_ELASTIC, c] - start[1, c]
+        imbalance = energy[KINETIC, c] + energy[STRAIN, c] + energy[DAMPING, c] + energy[JOINT, c] - energy[INPUT, c]
+        elastic = energy[JOINT_ELASTIC, c] - start.joints[c]
         drift = energy[JOINT, c] - elastic - energy[FRICTION, c] - energy[JOINT_DAMPING, c]
-        terms = abs(energy[INPUT, c]) + energy[KINETIC, c] + abs(energy[STRAIN, c] - start[0, c])
+        terms = abs(energy[INPUT, c]) + energy[KINETIC, c] + abs(energy[STRAIN, c])
         terms += abs(energy[DAMPING, c]) + abs(energy[JOINT, c])
-        account[0, c] = max(account[0, c], abs(stored + released - energy[INPUT, c]))
-        account[1, c] = max(account[1, c], abs(drift))
-        account[2, c] = max(account[2, c], terms)
+        worst[0, c] = max(worst[0, c], abs(imbalance))
+        worst[1, c] = max(worst[1, c], abs(drift))
+        worst[2, c] = max(worst[2, c], terms)

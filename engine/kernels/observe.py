@@ -1,11 +1,14 @@
-"""What is read from every step of all lanes: largest values, joints, section forces."""
+"""What is read from every step of all lanes: largest values, joints, section forces; and what is kept of every so many."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .jit import LANES, kernel
+from .jit import LANES, inlined_kernel, kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD
+from .march import FRICTION
+from .sparse import Rows, product
+from .vector import load, plus_product, store, zeros
 
 
 class CutRows(NamedTuple):
@@ -22,17 +25,11 @@ class CutRows(NamedTuple):
 
 
 @kernel
-def observe(values, standing, peaks, watched, record_holder):
-    """Update peaks (2, n, LANES), total and minus the static values `standing` (n, LANES).
-
-    record_holder (LANES,) tells the lanes in which entry `watched` has just reached its largest magnitude.
-    """
+def observe(values, standing, peaks):
+    """Update peaks (2, n, LANES), total and minus the static values `standing` (n, LANES)."""
     for i in range(values.shape[0]):
         for c in range(LANES):
-            size = abs(values[i, c])
-            if i == watched:
-                record_holder[c] = size > peaks[0, i, c]
-            peaks[0, i, c] = max(peaks[0, i, c], size)
+            peaks[0, i, c] = max(peaks[0, i, c], abs(values[i, c]))
             peaks[1, i, c] = max(peaks[1, i, c], abs(values[i, c] - standing[i, c]))
 
 
@@ -78,13 +75,14 @@ def section_forces(cut, alpha, beta, motion, ground, values):
     `ground` (2, LANES) included.
     """
     for i in range(values.shape[0]):
-        for c in range(LANES):
-            values[i, c] = cut.inertia[i, 0] * ground[0, c] + cut.inertia[i, 1] * ground[1, c]
+        total = plus_product(zeros(), cut.inertia[i, 0], load(ground, 0))
+        total = plus_product(total, cut.inertia[i, 1], load(ground, 1))
         for k in range(cut.indptr[i], cut.indptr[i + 1]):
             row, stiffness, mass = cut.indices[k], cut.stiffness[k], cut.mass[k]
-            for c in range(LANES):
-                v = motion.v[row, c]
-                values[i, c] += stiffness * (motion.u[row, c] + beta * v) + mass * (motion.a[row, c] + alpha * v)
+            total = plus_product(total, stiffness, load(motion.u, row))
+            total = plus_product(total, beta * stiffness + alpha * mass, load(motion.v, row))
+            total = plus_product(total, mass, load(motion.a, row))
+        store(values, i, total)
 
 
 @kernel
@@ -115,3 +113,109 @@ def joint_fractions(state, length, n_lane, fraction):
         if total > 0.0:
             fraction[0, lane] = open_length / total
             fraction[1, lane] = slip_length / total
+
+
+class Values(NamedTuple):
+    """Values linear in u and what is made of them: displacements, then from row `stresses` on the stresses of the points.
+
+    operator : (n_value, n_dof); values, static : (n_value, LANES); peaks : (2, n_value, LANES); principal : (2, n_point, LANES)
+    kept : (n_kept, n_value, LANES)
+    shape, shape_time, shape_state : (n_dof, LANES), (LANES,), (LANES, n_point) when the value in row `racking` was largest
+    """
+
+    operator: Rows
+    stresses: int
+    racking: int
+    values: np.ndarray
+    static: np.ndarray
+    peaks: np.ndarray
+    principal: np.ndarray
+    kept: np.ndarray
+    shape: np.ndarray
+    shape_time: np.ndarray
+    shape_state: np.ndarray
+
+
+class Joints(NamedTuple):
+    """What is seen and kept of the joint points; area, length : (n_point,), the rest as `observe_joints` and `Response` say."""
+
+    area: np.ndarray
+    length: np.ndarray
+    slip_before: np.ndarray
+    elastic_range: np.ndarray
+    peaks: np.ndarray
+    first_slip: np.ndarray
+    fractions: np.ndarray
+    friction: np.ndarray
+    states: np.ndarray
+    pressure: np.ndarray
+    slip: np.ndarray
+
+
+class Sections(NamedTuple):
+    """Section forces: cuts, what joints behind them add, loads (n_row, LANES) to take off; values, extremes, times, kept."""
+
+    cut: CutRows
+    joints: Rows
+    loads: np.ndarray
+    alpha: float
+    beta: float
+    forces: np.ndarray  # (2 n_point, LANES)
+    added: np.ndarray  # (n_row, LANES)
+    values: np.ndarray
+    extremes: np.ndarray
+    times: np.ndarray
+    kept: np.ndarray
+
+
+@inlined_kernel
+def see_values(of, time, motion, contact):
+    """Read the values of a step."""
+    product(of.operator, motion.u, of.values)
+    for c in range(LANES):
+        if abs(of.values[of.racking, c]) > of.peaks[0, of.racking, c]:
+            of.shape[:, c] = motion.u[:, c]
+            of.shape_state[c] = contact.state[c]
+            of.shape_time[c] = time
+    observe(of.values, of.static, of.peaks)
+    observe_principal(of.values, of.stresses, of.principal.shape[1], of.principal)
+
+
+@inlined_kernel
+def see_joints(of, time, n_lane, contact):
+    """Read the joints of a step."""
+    observe_joints(contact, of.area, n_lane, time, of.slip_before, of.elastic_range, of.peaks, of.first_slip)
+
+
+@inlined_kernel
+def keep_joints(of, row, n_lane, contact, energy):
+    """Keep the joints of a step."""
+    for lane in range(n_lane):
+        for p in range(of.area.shape[0]):
+            of.states[row, lane, p] = contact.state[lane, p]
+            of.pressure[row, lane, p] = -contact.force[lane, 2 * p] / of.area[p]
+            of.slip[row, lane, p] = contact.slip[lane, p]
+        of.friction[row, lane] = energy[FRICTION, lane]
+    joint_fractions(contact.state, of.length, n_lane, of.fractions[row])
+
+
+@inlined_kernel
+def see_sections(of, time, motion, contact, ground):
+    """Read the section forces of a step that ends with the base acceleration `ground` (2, LANES)."""
+    section_forces(of.cut, of.alpha, of.beta, motion, ground, of.values)
+    for c in range(LANES):
+        for i in range(of.forces.shape[0]):
+            of.forces[i, c] = contact.force[c, i] + contact.damped[c, i]
+    product(of.joints, of.forces, of.added)
+    for i in range(of.values.shape[0]):
+        for c in range(LANES):
+            of.values[i, c] += of.added[i, c] - of.loads[i, c]
+    observe_sections(of.values, time, of.extremes, of.times)
+
+
+@inlined_kernel
+def keep_rows(values, kept):
+    """Keep values (n, LANES) of a step; kept may be in single precision."""
+    for i in range(values.shape[0]):
+        for c in range(LANES):
+            kept[i, c] = values[i, c]

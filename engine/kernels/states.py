@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import LANES
+from .inverse import Inverse, Scratch, scratch
 
 
 class Law(NamedTuple):
@@ -26,37 +26,32 @@ class Points(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """The factor kept of one lane with the states it belongs to, and scratch: unknowns and G lambda (m,)."""
+    """The inverse kept of one lane, and scratch (m,): unknowns before and after a solve, G lambda, what an equation lacks."""
 
-    lu: np.ndarray
-    pivot: np.ndarray
-    factored: np.ndarray
+    inverse: Inverse
+    work: Scratch
     unknown: np.ndarray
+    answer: np.ndarray
     product: np.ndarray
-    change: "Change"
-
-
-class Change(NamedTuple):
-    """Scratch of a solve for states that differ from the factored ones in a few points; see `change`."""
-
-    points: np.ndarray  # (LANES // 2,) which they are
-    reduced: np.ndarray  # (m, LANES) unit changes of their equations, then the unknowns that follow
-    forces: np.ndarray  # (m, LANES) the forces that follow
-    matrix: np.ndarray  # (LANES, LANES) of the equations that hold instead
-    pivot: np.ndarray  # (LANES,)
-    rhs: np.ndarray  # (LANES,)
-    answer: np.ndarray  # (m,) forces of a solve
+    missing: np.ndarray
 
 
 class Workspace(NamedTuple):
-    """Scratch of the solve, and the factor kept for each lane with the states it belongs to."""
+    """Inverses of all lanes, lane first as in `Inverse`, and scratch."""
 
-    lu: np.ndarray  # (LANES, m, m)
-    pivot: np.ndarray  # (LANES, m)
-    factored: np.ndarray  # (LANES, n_point), -1 where there is none
-    unknown: np.ndarray  # (m,)
+    matrix: np.ndarray
+    unknown: np.ndarray
+    place: np.ndarray
+    tie: np.ndarray
+    state: np.ndarray
+    size: np.ndarray
+    work: Scratch
+    x: np.ndarray  # (m,)
+    answer: np.ndarray  # (m,)
     product: np.ndarray  # (m,) G lambda
+    missing: np.ndarray  # (m,)
     swept: np.ndarray  # (m,) forces of the sweeps
+    swept_product: np.ndarray  # (m,) and G times them
     free: np.ndarray  # (m,) g_free of the lane at work
     start: np.ndarray  # (m,) gaps of the last step
     far: np.ndarray  # (m,) g_free at the start of the path
@@ -64,33 +59,32 @@ class Workspace(NamedTuple):
     far_force: np.ndarray  # (m,)
     proposal: np.ndarray  # (n_point,)
     tried: np.ndarray  # (n_point,)
-    change: Change
 
 
 def workspace(n_point: int, lanes: int) -> Workspace:
     """An empty workspace for `n_point` joint points."""
     m = 2 * n_point
+    x, answer, product, missing, swept, swept_product, free, start, far, far_gap, far_force = np.zeros((11, m))
+    proposal, tried = np.zeros((2, n_point), dtype=np.int8)
     return Workspace(
         np.zeros((lanes, m, m)),
         np.zeros((lanes, m), dtype=np.int64),
+        np.full((lanes, m), -1, dtype=np.int64),
+        np.zeros((lanes, m)),
         np.full((lanes, n_point), -1, dtype=np.int8),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(n_point, dtype=np.int8),
-        np.zeros(n_point, dtype=np.int8),
-        Change(
-            np.zeros(LANES // 2, dtype=np.int64),
-            np.zeros((m, LANES)),
-            np.zeros((m, LANES)),
-            np.zeros((LANES, LANES)),
-            np.zeros(LANES, dtype=np.int64),
-            np.zeros(LANES),
-            np.zeros(m),
-        ),
+        np.zeros((lanes, 1), dtype=np.int64),
+        scratch(m),
+        x,
+        answer,
+        product,
+        missing,
+        swept,
+        swept_product,
+        free,
+        start,
+        far,
+        far_gap,
+        far_force,
+        proposal,
+        tried,
     )

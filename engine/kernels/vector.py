@@ -67,16 +67,22 @@ def _store(typing: Any, x: Any, row: Any, value: Any) -> tuple[Any, Callable]:
 
 
 def _plus_product(typing: Any, total: Any, factor: Any, x: Any) -> tuple[Any, Callable]:
-    """total + factor x, of vectors total and x and one number for all lanes; one rounding where the processor can."""
+    """total + factor x, of vectors total and x and a vector or one number for all lanes; one rounding where the processor can."""
+    alike = factor is not _ROW
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        one = builder.insert_element(_NOTHING, args[1], _FIRST)
-        everywhere = builder.shuffle_vector(one, _NOTHING, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+        factors = _everywhere(builder, args[1]) if alike else args[1]
         kind = ir.FunctionType(_DOUBLES, [_DOUBLES] * 3)
         multiply_add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fmuladd.v{LANES}f64")
-        return builder.call(multiply_add, [everywhere, args[2], args[0]])
+        return builder.call(multiply_add, [factors, args[2], args[0]])
 
-    return _ROW(_ROW, types.float64, _ROW), code
+    return _ROW(_ROW, types.float64 if alike else _ROW, _ROW), code
+
+
+def _everywhere(builder: Any, number: Any) -> Any:
+    """A vector with one number in all lanes."""
+    one = builder.insert_element(_NOTHING, number, _FIRST)
+    return builder.shuffle_vector(one, _NOTHING, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
 def _zeros(typing: Any) -> tuple[Any, Callable]:

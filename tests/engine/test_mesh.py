@@ -168,6 +168,9 @@ def test_sides_are_numbered_by_their_corners_whichever_comes_first(square, order
     assert sides.shape == (8,)
     assert are_sides(np.array([[0, 1], [1, 0], [4, 2], [3, 4], [0, 3]]), sides)
     assert not are_sides(np.array([[0, 1], [0, 2]]), sides)
+    for beyond in ([3, 5], [5, 6], [2**31, 2**31 - 1]):  # numbers above that of the last side
+        assert not are_sides(np.array([beyond]), sides)
+        assert not are_sides(np.array([[0, 1], beyond]), sides)
     assert are_sides(np.zeros((0, 2), dtype=np.int64), sides)
     np.testing.assert_array_equal(neighbours(np.array([3, 1, 4])), [[3, 1], [1, 4]])
 

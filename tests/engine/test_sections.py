@@ -29,7 +29,7 @@ from engine import (
     newmark_of,
     simulate,
 )
-from engine.kernels.observe import section_forces
+from engine.kernels.observe import section_forces, see_sections
 from engine.kernels.sparse import product
 from engine.mesh import shape_functions
 from engine.spec import Damping, Joint, Layer, Pressure, Time
@@ -325,12 +325,13 @@ def shaken(request):
     assert found[0]
     stepper = Stepper(system, newmark_of(spec), model.rayleigh)
     stepper.start(state, lanes, lanes.ground[0])
-    watch = SectionWatch(SectionForces.of(system), model.rayleigh, lanes, 1)
+    watch = SectionWatch(SectionForces.of(system), model.rayleigh, lanes, 1).of
     seen = []
     for step in range(1, 26):
-        assert not stepper.step(state, lanes, lanes.ground[step - 1], lanes.ground[step]).failed[0]
+        stepper.step(state, lanes, lanes.ground[step - 1], lanes.ground[step])
+        assert stepper.of.report.rounds[0] > 0
         if step % 6 == 0:
-            watch.see(0.01 * step, state, lanes.ground[step])
+            see_sections(watch, 0.01 * step, state.motion, state.contact, lanes.ground[step])
             seen.append((state.copy(), lanes.ground[step, :, 0].copy(), watch.values[:, 0].reshape(-1, 3).copy()))
     assert len({code for copy, _, _ in seen for code in copy.contact.state[0].tolist()}) >= 3  # open, sticking, slipping
     return model, seen

@@ -19,14 +19,16 @@ from engine import (
     Stepper,
     System,
     build_system,
-    equilibrium,
     natural_frequencies,
     simulate,
 )
 from engine.kernels.joint import OPEN
 from engine.kernels.march import FRICTION
+from engine.kernels.observe import see_sections
 from engine.simulate import PENETRATION, PRESSURE, SLIP
 from engine.watch import JointWatch, SectionWatch, ValueWatch
+
+from .by_hand import marched_by_hand
 
 DT, N_STEP, GRAVITY = 0.01, 100, 9.81
 RAYLEIGH = Rayleigh(0.8, 0.002)
@@ -71,15 +73,8 @@ def response(system, lanes) -> Response:
 
 @pytest.fixture(scope="module")
 def by_hand(system, lanes) -> list[State]:
-    """States of all steps, and the base accelerations that go with them."""
-    stepper = Stepper(system, Newmark(DT), RAYLEIGH)
-    state, _ = equilibrium(system, lanes, [lanes.standing], natural_frequencies(system, 1)[0])
-    stepper.start(state, lanes, lanes.ground[0])
-    states = [state.copy()]
-    for step in range(1, N_STEP + 1):
-        stepper.step(state, lanes, lanes.ground[step - 1], lanes.ground[step])
-        states.append(state.copy())
-    return states
+    """States of all steps."""
+    return marched_by_hand(Stepper(system, Newmark(DT), RAYLEIGH), lanes)
 
 
 # Values
@@ -161,10 +156,10 @@ def test_friction_takes_energy_on_the_whole(response):
 
 
 def test_histories_of_sections_are_those_of_a_march_by_hand(system, lanes, response, by_hand):
-    watch = SectionWatch(SectionForces.of(system), RAYLEIGH, lanes, 1)
+    watch = SectionWatch(SectionForces.of(system), RAYLEIGH, lanes, 1).of
     expected = []
     for step, state in enumerate(by_hand):
-        watch.see(DT * step, state, lanes.ground[step])
+        see_sections(watch, DT * step, state.motion, state.contact, lanes.ground[step])
         expected.append(watch.values[:, :3].T.reshape(3, 2, 3).copy())
     assert response.section_forces.dtype == np.float32
     np.testing.assert_array_equal(response.section_forces, np.stack(expected, axis=1).astype(np.float32))

@@ -109,10 +109,9 @@ def unloaded(system: System, ground: np.ndarray | None = None) -> Lanes:
 
 
 def with_motion(system: System, u: np.ndarray, v: np.ndarray, a: np.ndarray) -> State:
-    """A state of given motion, each (n_dof, LANES), with its images under M and K."""
+    """A state of given motion, each (n_dof, LANES)."""
     state = State.at_rest(system)
-    images = [x for matrix in (system.M, system.K) for x in (matrix @ u, matrix @ v, matrix @ a)]
-    for array, values in zip(state.motion, (u, v, a, *images), strict=True):
+    for array, values in zip(state.motion, (u, v, a), strict=True):
         array[:] = values
     return state
 
@@ -125,7 +124,7 @@ def amplification(omega: float, newmark: Newmark, rayleigh: Rayleigh, order: int
     state = with_motion(one.system, *(one.shape[:, None] * unit))
     rest = np.zeros((2, LANES))
     Stepper(one.system, newmark, rayleigh).step(state, unloaded(one.system), rest, rest)
-    return np.stack([one.coordinate(x[:, :3]) for x in state.motion[:3]])
+    return np.stack([one.coordinate(x[:, :3]) for x in state.motion])
 
 
 def principal(matrix: np.ndarray) -> complex:

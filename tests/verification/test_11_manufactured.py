@@ -135,10 +135,8 @@ def marched(
     if velocity is not None:
         motion = state.motion
         motion.v[:, 0] = velocity
-        motion.Mv[:], motion.Kv[:] = system.M @ motion.v, system.K @ motion.v
-        motion.Ma[:] = lanes.standing - ALPHA * motion.Mv - BETA * motion.Kv
-        motion.a[:] = solve(factorise(system.M, system.n_interior), motion.Ma.copy())
-        motion.Ka[:] = system.K @ motion.a
+        force = lanes.standing - ALPHA * (system.M @ motion.v) - BETA * (system.K @ motion.v)
+        motion.a[:] = solve(factorise(system.M, system.n_interior), force)
     for k in range(1, steps + 1):
         standing = np.zeros_like(lanes.standing)
         standing[:, 0] = load(k * dt)

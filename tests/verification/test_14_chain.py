@@ -101,7 +101,7 @@ def march(system, names, dt):
     slip = np.zeros((len(lanes.ground), n))
     for step in range(len(lanes.ground)):
         if step > 0:
-            assert not stepper.step(state, lanes, lanes.ground[step - 1], lanes.ground[step]).halved.any()
+            assert not stepper.step(state, lanes, lanes.ground[step - 1], lanes.ground[step]).any()
         columns[step, :4] = (read @ state.motion.u)[:, :n]
         columns[step, 4] = -state.contact.force[:n, ::2].sum(axis=1)
         columns[step, 5] = state.contact.force[:n, 1::2].sum(axis=1)

@@ -1,6 +1,7 @@
 """The condensed joint solve: hard random problems, each answer checked against equation and law in plain NumPy."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numba
 import numpy as np
@@ -11,7 +12,7 @@ from engine.kernels import contact
 from engine.kernels.contact import STATE_TOLERANCE
 from engine.kernels.direct import EQUATION_TOLERANCE
 from engine.kernels.joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from engine.kernels.states import Law, workspace
+from engine.kernels.states import Law, Points, workspace
 
 PLAIN = bool(numba.config.DISABLE_JIT)  # plain Python is slow: a sample of small problems then
 N_PROBLEM, LARGEST = (60, 5) if PLAIN else (600, 16)
@@ -149,24 +150,55 @@ def test_own_solution_as_start_takes_one_round(problem):
     rounds, _, gap_again, force_again, state_again = warm.solve()
     assert rounds == 1
     np.testing.assert_array_equal(state, state_again)
-    for first, second in ((gap, gap_again), (force, force_again)):  # the factor may be of other states: not the same bits
+    for first, second in ((gap, gap_again), (force, force_again)):  # an inverse brought along: not the same bits
         np.testing.assert_allclose(first, second, atol=10 * EQUATION_TOLERANCE * abs(first).max())
 
 
-def test_kept_factor_changes_rounding_alone(problem):
-    """The factor of the last step serves as long as the states last; from one of other states the solution is the same."""
+def test_kept_inverse_changes_rounding_alone(problem):
+    """The inverse of the last step serves as long as the states last; from one of other states the solution is the same."""
     _, _, _, force, state = problem.solve()
     warm = Problem(**{**vars(problem), "state": state, "force": force})
     work = workspace(len(problem.k_n), 1)
+    built = warm.solve(work=work)
+    assert (work.state[0] == state).all()
     first, second = warm.solve(work=work), warm.solve(work=work)
-    assert (work.factored[0] == state).all()
+    assert (work.state[0] == state).all()
     problem.solve(work=work)
-    third = warm.solve(work=work)
+    other = warm.solve(work=work)
     for a, b in zip(first, second, strict=True):
         np.testing.assert_array_equal(a, b)
-    np.testing.assert_array_equal(first[4], third[4])
-    for a, b in zip(first[2:4], third[2:4], strict=True):
-        np.testing.assert_allclose(a, b, atol=10 * EQUATION_TOLERANCE * abs(a).max())
+    for again in (first, other):
+        assert again[0] == 1
+        np.testing.assert_array_equal(built[4], again[4])
+        for a, b in zip(built[2:4], again[2:4], strict=True):
+            np.testing.assert_allclose(a, b, atol=10 * EQUATION_TOLERANCE * abs(a).max())
+
+
+def sweeping(p):
+    """What `_sweep` takes of a problem from rest: points, g_free, forces, G times them, states."""
+    n = len(p.k_n)
+    return Points(p.G, p.k_n, p.k_s, p.mu, p.slip), p.free, np.zeros(2 * n), np.zeros(2 * n), np.zeros(n, np.int8)
+
+
+def test_sweeps_stop_once_the_states_have_stood_still_for_some_of_them():
+    """Bit by bit those made by hand up to the last of QUIET in a row without another state; before that, as many as allowed."""
+    stirred_again = 0
+    for p in problems("neighbours", 60, 0.6, seed=4):
+        by_hand, most, seen = sweeping(p), 1000, []
+        while seen[-contact.QUIET :] != [True] * contact.QUIET and len(seen) < most:
+            before = by_hand[-1].copy()
+            seen.append(contact._sweep(*by_hand))
+            assert seen[-1] == (by_hand[-1] == before).all()
+        stirred_again += any(quiet and not following for quiet, following in pairwise(seen))
+        assert len(seen) < most
+        for allowed in (most, len(seen), len(seen) - 1):
+            found = sweeping(p)
+            contact._sweep_on(*found, allowed)
+            if allowed < len(seen):
+                contact._sweep(*found)
+            for x, y in zip(found[2:], by_hand[2:], strict=True):
+                np.testing.assert_array_equal(x, y)
+    assert stirred_again > 0  # a single quiet sweep is not the end
 
 
 @pytest.mark.parametrize("factor", [2.0**-30, 2.0**10])

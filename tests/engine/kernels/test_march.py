@@ -1,14 +1,16 @@
-"""History terms, commits and energies of a step against plain NumPy."""
+"""Effective load, commits and energies of a step against plain NumPy."""
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from engine import Newmark, Rayleigh
 from engine.kernels import march
 from engine.kernels.jit import LANES
 from engine.kernels.joint import slip_after
 from engine.kernels.march import DAMPING, FRICTION, INPUT, JOINT, JOINT_DAMPING, JOINT_ELASTIC, KINETIC, STRAIN
-from engine.kernels.states import Law, workspace
+from engine.kernels.sparse import Rows
+from engine.kernels.states import Law
 
 N, N_POINT, N_LANE = 6, 5, 3
 ALPHA, BETA = 0.3, 0.02
@@ -21,24 +23,34 @@ def scheme(request):
     return Newmark(0.1, *request.param)
 
 
+@pytest.fixture(params=[BETA, 0.0], ids=["damped by K too", "damped by M alone"])
+def rates(request, scheme):
+    return scheme.rates(Rayleigh(ALPHA, request.param))
+
+
 @pytest.fixture
 def rng():
     return np.random.default_rng(1)
 
 
 @pytest.fixture
-def matrices(rng):
-    """Dense M and K, positive definite."""
+def dense(rng, rates):
+    """M, C and K, positive definite."""
     A, B = rng.normal(size=(2, N, N))
-    return A @ A.T + np.eye(N), 10 * (B @ B.T + np.eye(N))
+    M, K = A @ A.T + np.eye(N), 10 * (B @ B.T + np.eye(N))
+    return M, rates.alpha * M + rates.beta * K, K
 
 
 @pytest.fixture
-def motion(rng, matrices):
-    """Any u, v, a with their images."""
-    M, K = matrices
-    u, v, a = rng.normal(size=(3, N, LANES))
-    return march.Motion(u, v, a, M @ u, M @ v, M @ a, K @ u, K @ v, K @ a)
+def matrices(dense):
+    """The same by rows."""
+    found = (sp.csr_array(matrix) for matrix in dense)
+    return march.Matrices(*(Rows(x.indptr.astype(np.int64), x.indices.astype(np.int64), x.data) for x in found))
+
+
+@pytest.fixture
+def motion(rng):
+    return march.Motion(*rng.normal(size=(3, N, LANES)))
 
 
 @pytest.fixture
@@ -46,43 +58,83 @@ def loads(rng):
     return march.Loads(rng.normal(size=(N, LANES)), rng.normal(size=(2, N)))
 
 
-def effective_load(scheme, matrices, loads, ground, u, v, a):
+def textbook_load(scheme, dense, loads, ground, u, v, a):
     """(D6) as in the textbook: R + M (a0 u + a2 v + a3 a) + C (a1 u + a4 v + a5 a)."""
-    M, K = matrices
+    M, C, _ = dense
     dt, b, c = scheme.dt, scheme.newmark_beta, scheme.newmark_gamma
-    C = ALPHA * M + BETA * K
     load = loads.standing - loads.inertia.T @ ground
     inertial = M @ (u / (b * dt**2) + v / (b * dt) + (1 / (2 * b) - 1) * a)
     return load + inertial + C @ (c / (b * dt) * u + (c / b - 1) * v + dt / 2 * (c / b - 2) * a)
 
 
-def test_history_is_the_effective_load(rng, scheme, matrices, motion, loads):
-    ground, rhs = rng.normal(size=(2, LANES)), np.full((N, LANES), np.nan)
-    march.history(scheme.rates(Rayleigh(ALPHA, BETA)), loads, ground, motion, rhs)
-    expected = effective_load(scheme, matrices, loads, ground, *motion[:3])
-    np.testing.assert_allclose(rhs, expected, rtol=ROUNDING, atol=ROUNDING * abs(expected).max())
+def effective_matrix(scheme, dense):
+    """(D6) K̂ = a0 M + a1 C + K."""
+    M, C, K = dense
+    return M / (scheme.newmark_beta * scheme.dt**2) + scheme.newmark_gamma / (scheme.newmark_beta * scheme.dt) * C + K
+
+
+def leaves(rates, motion):
+    """w of a motion."""
+    return sum(factor * x for factor, x in zip(march.load_part(rates), motion, strict=True))
+
+
+# The load
+
+
+def test_load_is_that_of_the_textbook_less_what_is_known_of_the_displacement(rng, scheme, rates, dense, matrices, motion, loads):
+    """K̂ (y + q) is the textbook's effective load: y solves K̂ y = R + M w, q is known before the step."""
+    ground, y, q = rng.normal(size=(2, LANES)), np.full((N, LANES), np.nan), np.full((N, LANES), np.nan)
+    march.effective_load(matrices.M, loads, ground, leaves(rates, motion), y)
+    march.known_displacement(rates, motion, 0, q)
+    expected = textbook_load(scheme, dense, loads, ground, *motion)
+    np.testing.assert_allclose(y + effective_matrix(scheme, dense) @ q, expected, atol=ROUNDING * abs(expected).max())
+
+
+def test_unknown_stands_for_displacement_and_velocity(scheme, rates, motion):
+    """u⁺ + beta v⁺ = (1 + a1 beta) y whatever the new displacement: no product with K is needed (D8)."""
+    q, new_u = np.full((N, LANES), np.nan), np.random.default_rng(2).normal(size=(N, LANES))
+    march.known_displacement(rates, motion, 0, q)
+    u, v, a = motion
+    dt, b, c = scheme.dt, scheme.newmark_beta, scheme.newmark_gamma
+    new_v = c / (b * dt) * (new_u - u) - (c / b - 1) * v - dt / 2 * (c / b - 2) * a
+    y = new_u - q
+    np.testing.assert_allclose(new_u + rates.beta * new_v, (1 + rates.a1 * rates.beta) * y, atol=ROUNDING)
+
+
+def test_known_displacement_is_filled_from_the_first_degree_of_freedom_asked_for(rates, motion):
+    whole, part = np.full((N, LANES), np.nan), np.full((N, LANES), 7.0)
+    march.known_displacement(rates, motion, 0, whole)
+    march.known_displacement(rates, motion, 4, part)
+    np.testing.assert_array_equal(part[4:], whole[4:])
+    assert (part[:4] == 7.0).all()
+
+
+# A whole step
 
 
 @pytest.fixture
-def committed(rng, scheme, matrices, motion, loads):
-    """A whole step without joints: the state before, the load means, and the state and energies after."""
-    M, K = matrices
-    rates = scheme.rates(Rayleigh(ALPHA, BETA))
+def committed(rng, scheme, rates, dense, matrices, motion, loads):
+    """A step without joints: the state before, the mean and the last base acceleration, the arrays of the step, energies."""
     before = march.Motion(*(x.copy() for x in motion))
     start, end = rng.normal(size=(2, 2, LANES))
-    rhs, energy = np.zeros((N, LANES)), np.zeros((8, LANES))
-    march.history(rates, loads, end, motion, rhs)
-    u = np.linalg.solve((rates.a0 + rates.a1 * ALPHA) * M + (1 + rates.a1 * BETA) * K, rhs)
-    march.commit(rates, loads, 0.5 * (start + end), rhs, u, M @ u, motion, energy)
-    return before, 0.5 * (start + end), end, u, energy
+    step, energy = march.Step(*np.full((4, N, LANES), np.nan)), np.zeros((8, LANES))
+    march.effective_load(matrices.M, loads, end, leaves(rates, motion), step.y)
+    step.y[:] = np.linalg.solve(effective_matrix(scheme, dense), step.y)
+    march.commit(rates, matrices, loads, 0.5 * (start + end), motion, step, energy)
+    return before, 0.5 * (start + end), end, step, energy
 
 
-def test_commit_satisfies_the_equation_of_motion(scheme, matrices, motion, loads, committed):
-    M, K = matrices
-    _, _, end, u, _ = committed
-    np.testing.assert_array_equal(motion.u, u)
-    residual = M @ motion.a + (ALPHA * M + BETA * K) @ motion.v + K @ motion.u - (loads.standing - loads.inertia.T @ end)
+def test_commit_satisfies_the_equation_of_motion(dense, motion, loads, committed):
+    M, C, K = dense
+    _, _, end, _, _ = committed
+    residual = M @ motion.a + C @ motion.v + K @ motion.u - (loads.standing - loads.inertia.T @ end)
     np.testing.assert_allclose(residual, 0.0, atol=ROUNDING * abs(M @ motion.a).max())
+
+
+def test_commit_finds_the_displacement_of_the_textbook(scheme, dense, motion, loads, committed):
+    before, _, end, _, _ = committed
+    expected = np.linalg.solve(effective_matrix(scheme, dense), textbook_load(scheme, dense, loads, end, *before))
+    np.testing.assert_allclose(motion.u, expected, atol=ROUNDING * abs(expected).max())
 
 
 def test_commit_follows_newmark(scheme, motion, committed):
@@ -95,23 +147,39 @@ def test_commit_follows_newmark(scheme, motion, committed):
     np.testing.assert_allclose(motion.v, v, atol=ROUNDING * abs(v).max() / dt)
 
 
-def test_images_stay_images(matrices, motion, committed):
-    M, K = matrices
-    for matrix, images in ((M, motion[3:6]), (K, motion[6:9])):
-        for x, image in zip(motion[:3], images, strict=True):
-            np.testing.assert_allclose(image, matrix @ x, atol=ROUNDING * abs(matrix @ x).max() * 100)  # a0 dt of loss
+def test_commit_leaves_what_the_next_step_and_the_accounts_need(rates, motion, committed):
+    """The displacement of the step, its mean velocity, and w of the new motion."""
+    before, _, _, step, _ = committed
+    np.testing.assert_array_equal(step.y, motion.u - before.u)
+    np.testing.assert_allclose(step.mean, 0.5 * (before.v + motion.v), atol=ROUNDING)
+    expected = leaves(rates, motion)
+    np.testing.assert_allclose(step.w, expected, atol=ROUNDING * abs(expected).max())
 
 
-def test_energies_of_a_step(matrices, motion, loads, committed):
-    M, K = matrices
+def test_works_of_a_step(dense, motion, loads, committed):
+    """Of loads and damping; the rest of the account is not touched."""
+    _, C, _ = dense
     before, mean_ground, _, _, energy = committed
     step, mean_v = motion.u - before.u, 0.5 * (before.v + motion.v)
     expected = np.zeros((8, LANES))
     expected[INPUT] = ((loads.standing - loads.inertia.T @ mean_ground) * step).sum(axis=0)
-    expected[KINETIC] = 0.5 * (motion.v * (M @ motion.v)).sum(axis=0)
-    expected[STRAIN] = 0.5 * (motion.u * (K @ motion.u)).sum(axis=0)
-    expected[DAMPING] = (step * ((ALPHA * M + BETA * K) @ mean_v)).sum(axis=0)
-    np.testing.assert_allclose(energy, expected, atol=ROUNDING * abs(expected).max() * 100)  # images lose a0 dt
+    expected[DAMPING] = (step * (C @ mean_v)).sum(axis=0)
+    np.testing.assert_allclose(energy, expected, atol=ROUNDING * abs(expected).max())
+    assert abs(expected[[INPUT, DAMPING]]).min(axis=1).max() > 1e-3  # there is something to compare
+
+
+def test_works_of_steps_add_up(rates, matrices, motion, loads, committed):
+    """A second commit adds to the account what it would have put into an empty one."""
+    _, mean_ground, _, step, energy = committed
+    again = march.Motion(*(x.copy() for x in motion))
+    first, y, own = energy.copy(), step.y.copy(), np.zeros((8, LANES))
+    march.commit(rates, matrices, loads, mean_ground, motion, step, energy)
+    step.y[:] = y
+    march.commit(rates, matrices, loads, mean_ground, again, step, own)
+    np.testing.assert_allclose(energy, first + own, atol=ROUNDING * abs(first + own).max())
+
+
+# Joints
 
 
 def law(rng):
@@ -166,39 +234,67 @@ def test_commit_of_joints_leaves_the_padding_alone(rng):
     assert not energy[:, N_LANE:].any()
 
 
-@pytest.mark.parametrize("own", [False, True], ids=["one G for all", "a G for each"])
-def test_joints_of_every_lane_are_solved(rng, own):
-    """Each lane's equation g + G lambda = g_free holds with its own law and G; padding is not touched."""
-    A = rng.normal(size=(LANES if own else 1, 2 * N_POINT, 2 * N_POINT))
-    G = A @ A.transpose(0, 2, 1)
-    law_, free, slip = law(rng), rng.normal(size=(2 * N_POINT, LANES)), rng.normal(size=(LANES, N_POINT))
-    found = march.Contact(*(np.zeros_like(x) for x in a_contact(rng)))
-    rounds, residual, source = np.zeros(LANES, dtype=np.int64), np.full(LANES, np.nan), np.full(LANES, np.nan)
-    work = workspace(N_POINT, LANES)
-    march.solve_joints(G, free, law_, N_LANE, 72, work, slip, found, rounds, residual, source)
-    for lane in range(N_LANE):
-        equation = found.gap[lane] + G[lane if own else 0] @ found.force[lane] - free[:, lane]
-        # EQUATION_TOLERANCE, with gaps and products of order ten
-        np.testing.assert_allclose(equation, 0.0, atol=1e-11)
-        closed = np.minimum(found.gap[lane, ::2], 0.0) * law_.k_n[lane]
-        np.testing.assert_allclose(found.force[lane, ::2], closed, atol=1e-12 * abs(closed).max())
-        assert source[lane] <= 1e-11  # the equation's norm over that of a step of order one
-    assert (rounds[:N_LANE] > 0).all()
-    assert not rounds[N_LANE:].any()
-    assert not found.force[N_LANE:].any()
+# Energies
 
 
-def test_audit_keeps_the_worst_imbalance_drift_and_scale(rng):
-    account, start = np.zeros((3, LANES)), rng.uniform(0, 1, (2, LANES))
-    energies = rng.normal(size=(4, 8, LANES))
-    energies[:, KINETIC] = abs(energies[:, KINETIC])
-    for energy in energies:
-        march.audit(energy, start, account)
-    strain = energies[:, STRAIN] - start[0]
-    parts = [energies[:, i] for i in (INPUT, KINETIC, DAMPING, JOINT)]
-    imbalance = energies[:, KINETIC] + strain + energies[:, DAMPING] + energies[:, JOINT] - energies[:, INPUT]
-    elastic = energies[:, JOINT_ELASTIC] - start[1]
-    drift = energies[:, JOINT] - elastic - energies[:, FRICTION] - energies[:, JOINT_DAMPING]
-    terms = sum(abs(part) for part in parts) + abs(strain)
+def start_of(rng, dense):
+    """Any static state, with the energies in it."""
+    u = rng.normal(size=(N, LANES))
+    Ku = dense[2] @ u
+    return march.Start(u, Ku, 0.5 * (u * Ku).sum(axis=0), rng.uniform(0, 1, LANES))
+
+
+def test_audit_finds_what_is_stored(rng, dense, matrices, motion):
+    """Kinetic energy, and the strain energy less that of the static state; works are not touched."""
+    M, _, K = dense
+    start, energy = start_of(rng, dense), rng.normal(size=(8, LANES))
+    expected = energy.copy()
+    expected[KINETIC] = 0.5 * (motion.v * (M @ motion.v)).sum(axis=0)
+    expected[STRAIN] = 0.5 * (motion.u * (K @ motion.u)).sum(axis=0) - start.strain
+    march.audit(matrices, motion, start, np.zeros((N, LANES)), energy, np.zeros((3, LANES)))
+    np.testing.assert_allclose(energy, expected, atol=ROUNDING * abs(expected).max())
+
+
+def test_small_change_of_a_large_strain_energy_keeps_its_digits(rng, dense, matrices):
+    """Moved by 2⁻³⁰ of the static displacement: the difference of the two energies themselves would keep seven digits."""
+    start, direction = start_of(rng, dense), rng.integers(-8, 9, (N, LANES)) * 2.0**-3
+    start = start._replace(u=np.round(start.u * 2.0**10) * 2.0**-10)
+    start.Ku[:] = dense[2] @ start.u
+    change = direction * 2.0**-30  # exact, and so is u + change
+    moved = march.Motion(start.u + change, np.zeros((N, LANES)), np.zeros((N, LANES)))
+    energy = np.zeros((8, LANES))
+    march.audit(matrices, moved, start, np.zeros((N, LANES)), energy, np.zeros((3, LANES)))
+    expected = (change * (start.Ku + 0.5 * dense[2] @ change)).sum(axis=0)
+    # sums of N products each of N: N² units in the last place of their magnitudes
+    scale = (abs(change) * (abs(dense[2]) @ abs(start.u))).sum(axis=0)
+    assert (abs(energy[STRAIN] - expected) <= N**2 * np.finfo(float).eps * scale).all()
+
+
+def test_audit_keeps_the_worst_imbalance_drift_and_scale(rng, dense, matrices):
+    start, worst = start_of(rng, dense), np.zeros((3, LANES))
+    works, states = rng.normal(size=(4, 8, LANES)), rng.normal(size=(4, 2, N, LANES))
+    energies = works.copy()
+    for energy, (u, v) in zip(energies, states, strict=True):
+        march.audit(matrices, march.Motion(u, v, np.full_like(u, np.nan)), start, np.zeros((N, LANES)), energy, worst)
+    kinetic, strain = energies[:, KINETIC], energies[:, STRAIN]
+    imbalance = kinetic + strain + works[:, DAMPING] + works[:, JOINT] - works[:, INPUT]
+    drift = works[:, JOINT] - (works[:, JOINT_ELASTIC] - start.joints) - works[:, FRICTION] - works[:, JOINT_DAMPING]
+    terms = sum(abs(part) for part in (works[:, INPUT], kinetic, strain, works[:, DAMPING], works[:, JOINT]))
     expected = [abs(imbalance).max(axis=0), abs(drift).max(axis=0), terms.max(axis=0)]
-    np.testing.assert_allclose(account, expected, rtol=1e-14, atol=1e-15)  # sums of five numbers of order one
+    np.testing.assert_allclose(worst, expected, rtol=1e-14, atol=1e-15 * terms.max())  # sums of five such numbers
+
+
+@pytest.mark.parametrize("scheme", [(0.25, 0.5)], indirect=True)
+def test_balance_of_a_trapezoidal_step_closes(rng, scheme, rates, dense, matrices, loads):
+    """(D11) for a step without joints, from rest: work of the loads = kinetic + strain + damping."""
+    M, _, K = dense
+    u, still = rng.normal(size=(N, LANES)), np.zeros((2, LANES))
+    motion = march.Motion(u, np.zeros((N, LANES)), np.linalg.solve(M, loads.standing - K @ u))
+    start = march.Start(u.copy(), K @ u, 0.5 * (u * (K @ u)).sum(axis=0), np.zeros(LANES))
+    step, energy, worst = march.Step(*np.zeros((4, N, LANES))), np.zeros((8, LANES)), np.zeros((3, LANES))
+    march.effective_load(matrices.M, loads, still, leaves(rates, motion), step.y)
+    step.y[:] = np.linalg.solve(effective_matrix(scheme, dense), step.y)
+    march.commit(rates, matrices, loads, still, motion, step, energy)
+    march.audit(matrices, motion, start, step.change, energy, worst)
+    assert (worst[0] <= ROUNDING * worst[2]).all()
+    assert (worst[2] > 1e-3).all()

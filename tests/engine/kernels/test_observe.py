@@ -7,7 +7,8 @@ import scipy.sparse as sp
 from engine.kernels import observe
 from engine.kernels.jit import LANES
 from engine.kernels.joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from engine.kernels.march import Contact, Motion
+from engine.kernels.march import FRICTION, Contact, Motion
+from engine.kernels.sparse import Rows
 
 N_POINT, N_LANE = 5, 3
 # Sums of some twenty products of order one.
@@ -30,16 +31,92 @@ def a_contact(rng):
 
 def test_peaks_are_of_magnitude_total_and_minus_static(rng):
     history, standing = rng.normal(size=(20, 3, LANES)), rng.normal(size=(3, LANES))
-    peaks, holder, last = np.zeros((2, 3, LANES)), np.zeros(LANES, dtype=bool), np.zeros(LANES, dtype=int)
-    for i, values in enumerate(history):
-        observe.observe(values, standing, peaks, 1, holder)
-        last[holder] = i
+    peaks = np.zeros((2, 3, LANES))
+    for values in history:
+        observe.observe(values, standing, peaks)
     np.testing.assert_array_equal(peaks[0], abs(history).max(axis=0))
     np.testing.assert_array_equal(peaks[1], abs(history - standing).max(axis=0))
-    np.testing.assert_array_equal(last, abs(history[:, 1]).argmax(axis=0))
+
+
+def as_rows(matrix):
+    own = sp.csr_array(matrix)
+    return Rows(own.indptr.astype(np.int64), own.indices.astype(np.int64), own.data)
+
+
+def test_values_of_a_history_and_the_shape_at_the_largest_racking(rng):
+    """Linear values, their peaks, principal stresses, and what the mesh and the joints were when |racking| was largest."""
+    n_dof, n_value, racking, n_step = 9, 7, 2, 12  # three values, then the stresses of a point
+    operator = rng.normal(size=(n_value, n_dof)) * (rng.uniform(size=(n_value, n_dof)) < 0.6)
+    values, static, kept = np.zeros((n_value, LANES)), rng.normal(size=(n_value, LANES)), np.zeros((1, n_value, LANES))
+    peaks, principal = np.zeros((2, n_value, LANES)), np.array([np.full((1, LANES), -np.inf), np.full((1, LANES), np.inf)])
+    shape, time, state = np.zeros((n_dof, LANES)), np.zeros(LANES), np.zeros((LANES, N_POINT))
+    of = observe.Values(as_rows(operator), 3, racking, values, static, peaks, principal, kept, shape, time, state)
+    displacements, contacts = rng.normal(size=(n_step, n_dof, LANES)), [a_contact(rng) for _ in range(n_step)]
+    for i, (u, contact) in enumerate(zip(displacements, contacts, strict=True)):
+        observe.see_values(of, 0.25 * i, Motion(u, *np.full((2, *u.shape), np.nan)), contact)
+        np.testing.assert_allclose(of.values, operator @ u, atol=10 * ROUNDING)
+    history = operator @ displacements
+    np.testing.assert_allclose(of.peaks, [abs(history).max(axis=0), abs(history - static).max(axis=0)], atol=10 * ROUNDING)
+    at = abs(history[:, racking]).argmax(axis=0)
+    np.testing.assert_array_equal(of.shape_time, 0.25 * at)
+    for lane, i in enumerate(at):
+        np.testing.assert_array_equal(of.shape[:, lane], displacements[i, :, lane])
+        np.testing.assert_array_equal(of.shape_state[lane], contacts[i].state[lane])
+    zz = history[:, 6]
+    assert (of.principal[0, 0] >= zz.max(axis=0) - ROUNDING * 10).all()
+    assert (of.principal[1, 0] <= zz.min(axis=0) + ROUNDING * 10).all()
+    assert not of.kept.any()
+
+
+def test_racking_that_comes_again_is_no_new_shape(rng):
+    """The first of equal ones is kept, whichever its sign."""
+    one, none = np.ones((1, LANES)), np.zeros((0, LANES))
+    of = observe.Values(
+        as_rows(np.ones((1, 1))), 1, 0, 0 * one, 0 * one, np.zeros((2, 1, LANES)), np.zeros((2, 0, LANES)), none[None],
+        0 * one, np.zeros(LANES), np.zeros((LANES, N_POINT)),
+    )  # fmt: skip
+    for i, size in enumerate((1.0, -1.0, 1.0)):
+        observe.see_values(of, float(i + 1), Motion(size * one, one, one), a_contact(rng))
+    np.testing.assert_array_equal(of.shape_time, 1.0)
+    np.testing.assert_array_equal(of.shape, 1.0)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_rows_are_kept_as_they_are_or_in_single_precision(rng, kind):
+    values, kept = rng.normal(size=(3, LANES)), np.full((3, LANES), np.nan, dtype=kind)
+    observe.keep_rows(values, kept)
+    np.testing.assert_array_equal(kept, values.astype(kind))
 
 
 # Joints
+
+
+def test_joints_are_kept_in_the_row_of_their_step(rng):
+    """States, pressure, slip, friction work and fractions of the lanes in use; other rows and lanes are untouched."""
+    area, length, contact, energy = *rng.uniform(1, 2, (2, N_POINT)), a_contact(rng), rng.normal(size=(8, LANES))
+    none = np.zeros((LANES, N_POINT))
+    fractions, friction = np.full((3, 2, LANES), np.nan), np.full((3, LANES), np.nan)
+    states, (pressure, slip) = np.full((3, LANES, N_POINT), -1, np.int8), np.full((2, 3, LANES, N_POINT), np.nan, np.float32)
+    peaks, first = np.zeros((4, LANES, N_POINT)), none.copy()
+    of = observe.Joints(area, length, none, none, peaks, first, fractions, friction, states, pressure, slip)
+    observe.keep_joints(of, 1, N_LANE, contact, energy)
+    expected = {
+        "states": contact.state,
+        "pressure": (-contact.force[:, ::2] / area).astype(np.float32),
+        "slip": contact.slip.astype(np.float32),
+        "friction": energy[FRICTION],
+    }
+    for name, values in expected.items():
+        np.testing.assert_array_equal(getattr(of, name)[1, :N_LANE], values[:N_LANE], err_msg=name)
+    shares = [(contact.state == OPEN) @ length, (contact.state >= SLIP_FORWARD) @ length] / length.sum()
+    np.testing.assert_allclose(of.fractions[1, :, :N_LANE], shares[:, :N_LANE], atol=ROUNDING)
+    for name in ("pressure", "slip", "friction"):
+        found = getattr(of, name)
+        assert np.isnan(found[[0, 2]]).all()
+        assert np.isnan(found[1, N_LANE:]).all()
+    assert (of.states[[0, 2]] == -1).all()
+    assert np.isnan(of.fractions[[0, 2]]).all()
+    assert not of.peaks.any()
 
 
 def test_peaks_of_joints_and_first_slip(rng):
@@ -108,7 +185,7 @@ def test_section_forces_are_those_of_stiffness_damping_and_inertia(rng):
     row = np.repeat(np.arange(n_row), np.diff(own.indptr))
     indptr, indices = own.indptr.astype(np.int64), own.indices.astype(np.int64)
     cut = observe.CutRows(indptr, indices, K[row, indices], M[row, indices], inertia)
-    motion = Motion(*rng.normal(size=(9, n_dof, LANES)))
+    motion = Motion(*rng.normal(size=(3, n_dof, LANES)))
     values = np.full((n_row, LANES), np.nan)
     observe.section_forces(cut, alpha, beta, motion, ground, values)
     expected = K @ (motion.u + beta * motion.v) + M @ (motion.a + alpha * motion.v) + inertia @ ground
