@@ -72,6 +72,10 @@ class Study:
         """Number of steps of all cases that are solved."""
         return sum(self.steps(case) for case in self.scaling.solved)
 
+    def batch_steps(self, batch: int) -> int:
+        """Number of steps of all cases of a batch that are solved."""
+        return sum(self.steps(case) for case in self.batches[batch].cases)
+
     def label(self, case: int) -> str:
         """The case in words: 'p0 = 2 MPa'."""
         index = np.unravel_index(case, self.shape) if self.axes else ()
@@ -92,13 +96,13 @@ class Study:
         """Solved cases grouped by what they share, with those that follow; it depends on the study alone."""
         groups: dict[str, list[int]] = {}
         for i in self.scaling.solved:
-            groups.setdefault(_shared(self.cases[i]), []).append(i)
+            groups.setdefault(shared(self.cases[i]), []).append(i)
         followers = self.scaling.followers
         marched = (tuple(group[i : i + LANES]) for group in groups.values() for i in range(0, len(group), LANES))
         return tuple(Batch(cases, tuple(f for case in cases for f in followers.get(case, ()))) for cases in marched)
 
 
-def _shared(spec: Spec) -> str:
+def shared(spec: Spec) -> str:
     """What cases of one batch have in common: all but pressure, motion, gravity and friction, which are a lane's own."""
     shared = spec.model_dump(exclude={"pressure", "motion", "synthetic", "ricker", "gravity"})
     for layer in shared["layer"]:

@@ -3,11 +3,12 @@
 import os
 import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import islice
 from multiprocessing import active_children, get_context
 from pathlib import Path
 
@@ -31,13 +32,16 @@ from engine import (
 from .dataset import build_dataset, case_arrays, with_followers
 from .domain_size import with_convergence
 from .messages import StudyError
-from .plan import Batch, Study, load_study
+from .plan import Batch, Study, load_study, shared
 from .uplift import uplift_over_weight
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 TRIES_ALONE = 2
 """How often a batch is tried by itself after the pool it ran in has broken."""
+
+JOBS_A_WORKER = 2
+"""Jobs that are made ahead, the one that runs included."""
 
 Progress = Callable[[int], None]
 """Told how many case-steps have been done since it was last called."""
@@ -64,11 +68,6 @@ class Job:
         lane = np.array([batch.cases.index(case) for case in scaling.solved_as[followers]], dtype=int)
         motions = [study.ground(case) for case in cases]
         return cls([study.cases[case] for case in cases], motions, len(batch.cases), lane, scaling.scaled_by[followers])
-
-    @property
-    def case_steps(self) -> int:
-        """How many steps of cases are marched."""
-        return sum(len(motion) - 1 for motion in self.motions[: self.n_marched])
 
 
 @dataclass(frozen=True)
@@ -129,34 +128,49 @@ def _emptied(whole: Outcome, n_case: int, lost: Lost) -> Outcome:
 
 
 def _outcomes(study: Study, workers: int, progress: Progress) -> Iterator[tuple[int, Outcome | Lost]]:
-    jobs = {i: Job.of(study, batch) for i, batch in enumerate(study.batches)}
-    if min(workers, len(jobs)) == 1:
-        for i, job in jobs.items():
-            yield i, _guarded(job, progress)
+    left = list(range(len(study.batches)))
+    if min(workers, len(left)) == 1:
+        for i in left:
+            yield i, _guarded(Job.of(study, study.batches[i]), progress)
         return
     compile_kernels()  # once, not in every process
+    models: dict[str, Model] = {}
     with _one_thread():
-        left = dict(jobs)
-        for i, outcome in _in_pool(jobs, min(workers, len(jobs))):
-            progress(jobs[i].case_steps)
-            del left[i]
-            yield i, outcome
-        for i, job in left.items():  # a worker was lost and took the pool with it: each batch left gets a pool of its own
-            yield i, _alone(job)
-            progress(job.case_steps)
+        for i, outcome in _in_pool(study, tuple(left), min(workers, len(left))):
+            progress(study.batch_steps(i))
+            left.remove(i)
+            yield i, _with_one_model(models, outcome)
+        for i in left:  # a worker was lost and took the pool with it: each batch left gets a pool of its own
+            yield i, _with_one_model(models, _alone(study, i))
+            progress(study.batch_steps(i))
 
 
-def _in_pool(jobs: dict[int, Job], workers: int) -> Iterator[tuple[int, Outcome | Lost]]:
-    """Outcomes as they come; ends early where a worker is lost, which breaks the whole pool."""
+def _with_one_model(models: dict[str, Model], outcome: Outcome | Lost) -> Outcome | Lost:
+    """The outcome with the one model of all that share it, each of which came with a copy from its process."""
+    if isinstance(outcome, Lost):
+        return outcome
+    return replace(outcome, model=models.setdefault(shared(outcome.model.spec), outcome.model))
+
+
+def _in_pool(study: Study, batches: tuple[int, ...], workers: int) -> Iterator[tuple[int, Outcome | Lost]]:
+    """Outcomes as they come; ends early where a worker is lost, which breaks the whole pool.
+
+    No more jobs are made than keep all workers busy: their motions need not wait in memory.
+    """
+    waiting = iter(batches)
+    running: dict[Future[Outcome | Lost], int] = {}
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent) as pool:
-        futures = {pool.submit(_guarded, job): i for i, job in jobs.items()}
         try:
-            for future in as_completed(futures):
-                try:
-                    outcome = future.result()
-                except BrokenProcessPool:
-                    continue
-                yield futures[future], outcome
+            while True:
+                with suppress(BrokenProcessPool):
+                    for i in islice(waiting, JOBS_A_WORKER * workers - len(running)):
+                        running[pool.submit(_guarded, Job.of(study, study.batches[i]))] = i
+                if not running:
+                    return
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    i = running.pop(future)
+                    with suppress(BrokenProcessPool):
+                        yield i, future.result()
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
             for child in active_children():
@@ -168,9 +182,9 @@ def _leave_interrupts_to_the_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _alone(job: Job) -> Outcome | Lost:
+def _alone(study: Study, batch: int) -> Outcome | Lost:
     for _ in range(TRIES_ALONE):
-        for _, outcome in _in_pool({0: job}, 1):
+        for _, outcome in _in_pool(study, (batch,), 1):
             return outcome
     return Lost(Status.WORKER_LOST, f"the process that computed it was lost {1 + TRIES_ALONE} times")
 
@@ -201,7 +215,7 @@ def _one_thread() -> Iterator[None]:
 def run_batch(job: Job, progress: Progress | None = None) -> Outcome:
     """March one batch with its free field, and gather what the dataset holds of all its cases."""
     n, specs = job.n_marched, job.specs[: job.n_marched]
-    model = build_model(specs[0])
+    model = _model(_Sharing(shared(specs[0]), specs[0]))
     depths = [_depth_of_the_record(spec) for spec in job.specs]
     motions = _at_the_base(model, job.motions, depths)
     told = 0
@@ -242,6 +256,20 @@ def trace_case(study: Study, case: int, tell: Callable[[Trace, Model], None]) ->
     motions = _at_the_base(model, [study.ground(case)], [_depth_of_the_record(spec)])
     response = simulate_cases(model, [spec], motions, trace=lambda step: tell(step, model))
     return Status(response.status[0]), response.reason[0]
+
+
+@dataclass(frozen=True)
+class _Sharing:
+    """Cases that share a model, and one of them."""
+
+    what: str
+    spec: Spec = field(compare=False)
+
+
+@lru_cache(maxsize=1)
+def _model(of: _Sharing) -> Model:
+    """The model of a batch; the next one of the same process often shares it."""
+    return build_model(of.spec)
 
 
 @lru_cache(maxsize=64)

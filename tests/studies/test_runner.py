@@ -2,16 +2,20 @@
 
 import multiprocessing
 import os
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import studies
-from engine import Status
+from engine import LANES, Status
 from studies import run_study, runner, write_dataset
-from studies.plan import Batch
-from studies.runner import ONE_THREAD, Job, run_batch, trace_case
+from studies.plan import Batch, shared
+from studies.runner import JOBS_A_WORKER, ONE_THREAD, Job, Lost, Outcome, run_batch, trace_case
 
 from .conftest import FAILING, QUICK, SHORT, study_of
 
@@ -43,14 +47,99 @@ def test_two_processes_give_the_bits_of_one():
 def test_kernels_are_compiled_before_processes_start(monkeypatch):
     done = []
 
-    def in_pool(jobs, workers):
+    def in_pool(study, batches, workers):
         done.append("pool")
-        return ((i, runner._guarded(job)) for i, job in jobs.items())
+        return ((i, runner._guarded(Job.of(study, study.batches[i]))) for i in list(batches))
 
     monkeypatch.setattr(runner, "compile_kernels", lambda: done.append("compiled"))
     monkeypatch.setattr(runner, "_in_pool", in_pool)
     run_study(study_of(TWO_BATCHES), workers=2)
     assert done == ["compiled", "pool"]
+
+
+# models and jobs --------------------------------------------------------------------------------------------------------------
+
+
+MANY = f"{SHORT}[sweep]\np0 = {{ from = 0, to = '4 MPa', num = {LANES + 1} }}\ndamping_ratio = [0.02, 0.05]\n"
+"""Two models, each with two batches."""
+
+NINE = f"{SHORT}[sweep]\ndamping_ratio = {{ from = 0.01, to = 0.05, num = 9 }}\n"
+
+
+class Threads(ThreadPoolExecutor):
+    """Threads of this process in place of others."""
+
+    def __init__(self, workers, mp_context, initializer):
+        super().__init__(workers)
+
+
+def empty_outcome(spec):
+    """An outcome without arrays, of a model that has a spec and nothing else."""
+    return Outcome(SimpleNamespace(spec=spec), {})
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_no_more_jobs_are_made_than_keep_all_workers_busy(monkeypatch, workers):
+    """A job holds its motions: those of a long study would not fit beside each other."""
+    study, made = study_of(NINE), []
+    assert len(study.batches) == 9
+
+    def of(study, batch):
+        made.append(batch)
+        return batch
+
+    monkeypatch.setattr(runner, "ProcessPoolExecutor", Threads)
+    monkeypatch.setattr(runner.Job, "of", of)
+    monkeypatch.setattr(runner, "_guarded", lambda batch: batch)
+    most, given = JOBS_A_WORKER * workers, []
+    for i, outcome in runner._in_pool(study, list(range(9)), workers):
+        assert outcome is study.batches[i]
+        assert len(made) - len(given) <= most
+        assert len(made) >= min(most, 9)
+        given.append(i)
+    assert sorted(given) == list(range(9))
+    assert made == list(study.batches)
+
+
+def test_no_batch_is_left_by_a_pool_that_loses_no_worker(monkeypatch):
+    """Each of nine is an outcome of the pool; one by one are only those that a lost worker has left."""
+    study, one_by_one = study_of(NINE), []
+    monkeypatch.setattr(runner, "ProcessPoolExecutor", Threads)
+    monkeypatch.setattr(runner, "_guarded", lambda job: empty_outcome(job.specs[0]))
+
+    def alone(study, i):
+        one_by_one.append(i)
+        return empty_outcome(study.cases[i])
+
+    monkeypatch.setattr(runner, "_alone", alone)
+    given = [i for i, _ in runner._outcomes(study, 2, lambda steps: None)]
+    assert sorted(given) == list(range(9))
+    assert one_by_one == []
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_outcomes_that_share_a_model_hold_one_object(monkeypatch, workers):
+    """Also where each comes with a copy, as from another process."""
+    study = study_of(MANY)
+    common = [shared(study.cases[batch.cases[0]]) for batch in study.batches]
+    assert len(common) == 4
+    assert len(set(common)) == 2
+
+    def in_pool(study, batches, workers):
+        for i in list(batches):
+            yield i, pickle.loads(pickle.dumps(empty_outcome(study.cases[study.batches[i].cases[0]])))
+
+    if workers > 1:
+        monkeypatch.setattr(runner, "_in_pool", in_pool)
+    models = {i: outcome.model for i, outcome in runner._outcomes(study, workers, lambda steps: None)}
+    for i, j in product(range(4), repeat=2):
+        assert (models[i] is models[j]) == (common[i] == common[j])
+
+
+def test_a_lost_batch_has_no_model_to_share():
+    lost, models = Lost(Status.NOT_RUN, "no room"), {}
+    assert runner._with_one_model(models, lost) is lost
+    assert models == {}
 
 
 def test_a_second_run_gives_the_same_bits(quick, quick_ds):
