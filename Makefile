@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 STUDY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help install study test verify figures check check-platforms clean
+.PHONY: help install study test verify figures versus check check-platforms clean
 
 help: ## list the targets
 	@echo "make study              run all named studies, from nothing; results and figures in results/"
@@ -19,6 +19,7 @@ help: ## list the targets
 	@echo "make test               run the tests"
 	@echo "make verify             run the verification cases alone, with their names"
 	@echo "make figures            draw the figures of docs/ anew, some minutes"
+	@echo "make versus             OpenSees and coralquake on the same model, one figure: results/versus.png"
 	@echo "make check              style, format, import contract, types"
 	@echo "make check-platforms    do the pinned versions have wheels on every platform and Python? installs nothing"
 	@echo "make install            make .venv with the command $(BIN)/coralquake"
@@ -39,6 +40,10 @@ help: ## list the targets
 	$(PIP) install --quiet --only-binary :all: --constraint pins.txt --editable ".[dev]"
 	@touch $@
 
+.venv/peer: .venv/installed
+	@if $(PIP) install --quiet --only-binary :all: --constraint pins.txt --editable ".[peer]"; then touch $@; \
+	else echo "OpenSeesPy could not be installed: its stored result stands in"; fi
+
 install: .venv/installed
 	@echo "ready: $(BIN)/coralquake --help"
 
@@ -54,6 +59,9 @@ verify: .venv/tools
 figures: .venv/installed
 	$(BIN)/python docs/signs.py
 	$(BIN)/python docs/mesh_convergence.py
+
+versus: .venv/peer
+	$(BIN)/python -m benchmarks.versus
 
 check: .venv/tools
 	$(BIN)/ruff check .

@@ -107,6 +107,17 @@ def test_install_with_spaces_in_every_path(checkout):
     assert make(checkout, "--question", ".venv/installed", path=os.defpath).returncode == 0
 
 
+@pytest.mark.parametrize("fails", [True, False])
+def test_the_comparison_is_drawn_whether_opensees_can_be_installed_or_not(checkout, fails):
+    refusal = 'case "$*" in *[[]peer]*) exit 1;; esac; ' if fails else ""
+    command(checkout, "my python", refusal + RECORDS_ITS_CALLS)
+    done = make(checkout, "versus", f"PYTHON={checkout}/commands/my python", path=os.defpath)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert ("could not be installed" in done.stdout) == fails
+    assert (checkout / ".venv" / "peer").exists() != fails  # tried again the next time
+    assert (checkout / "calls").read_text().splitlines()[-1] == "-m benchmarks.versus"
+
+
 def test_windows_has_its_own_folder_for_commands(checkout):
     assert ".venv/Scripts/python -m pip" in make(checkout, "-n", "install", "OS=Windows_NT").stdout
     assert ".venv/bin/python -m pip" in make(checkout, "-n", "install").stdout
