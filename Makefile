@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 STUDY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help install study test verify figures versus check check-platforms clean
+.PHONY: help install study test verify figures versus bench bench-large check check-platforms clean
 
 help: ## list the targets
 	@echo "make study              run all named studies, from nothing; results and figures in results/"
@@ -20,6 +20,8 @@ help: ## list the targets
 	@echo "make verify             run the verification cases alone, with their names"
 	@echo "make figures            draw the figures of docs/ anew, some minutes"
 	@echo "make versus             OpenSees and coralquake on the same model, one figure: results/versus.png"
+	@echo "make bench              all timings, beside OpenSees where it can be installed; some minutes; results/bench.json"
+	@echo "make bench-large        10,000 cases of 1,000 steps on two cores: seconds, memory, results/large.nc"
 	@echo "make check              style, format, import contract, types"
 	@echo "make check-platforms    do the pinned versions have wheels on every platform and Python? installs nothing"
 	@echo "make install            make .venv with the command $(BIN)/coralquake"
@@ -42,7 +44,7 @@ help: ## list the targets
 
 .venv/peer: .venv/installed
 	@if $(PIP) install --quiet --only-binary :all: --constraint pins.txt --editable ".[peer]"; then touch $@; \
-	else echo "OpenSeesPy could not be installed: its stored result stands in"; fi
+	else echo "OpenSeesPy could not be installed: versus shows its stored result, bench says so"; fi
 
 install: .venv/installed
 	@echo "ready: $(BIN)/coralquake --help"
@@ -62,6 +64,12 @@ figures: .venv/installed
 
 versus: .venv/peer
 	$(BIN)/python -m benchmarks.versus
+
+bench: .venv/peer
+	$(BIN)/python -m benchmarks
+
+bench-large: .venv/installed
+	$(BIN)/python -m benchmarks.large
 
 check: .venv/tools
 	$(BIN)/ruff check .

@@ -10,19 +10,15 @@ from statistics import median
 
 import numpy as np
 
-from engine import LANES, Model, Spec, Status, build_model, simulate_cases
+from engine import Model, Spec, build_model, simulate_cases
 from engine.mesh import Floats
-from engine.spec import Output
 
-from .clock import Stopwatch, pinned
+from .clock import pinned
+from .loop import time_loop
 from .models import DT, MESHES, OPENING, SLIDING, STICKING, Loading, shaking, spec_of
 from .peer import PLAIN, REMEMBERING, SOLVERS, Case, Contact, March, march, opensees
 
-OUR_STEPS = (100, 500)
-"""The difference of two marches of so many steps is the time loop."""
-
-SCALES = np.linspace(1.0, 0.7, LANES)
-"""Of the shaking, lane by lane: no two cases are the same."""
+OUR_STEPS = 500
 
 NOT_INSTALLED = "not installed"
 
@@ -96,19 +92,19 @@ def ratio_to_opensees(rows: list[Row]) -> dict[int, float]:
 
 def measured(setting: Setting, runs: int) -> Row:
     """Both codes in turn, `runs` times, pinned to one core."""
-    spec = spec_of(MESHES[setting.mesh], setting.loading, DT * max(*OUR_STEPS, setting.peer_steps))
+    spec = spec_of(MESHES[setting.mesh], setting.loading, DT * max(OUR_STEPS, setting.peer_steps))
     model = build_model(spec)
     motion = shaking(spec)
     contact = setting.contact if opensees() is not None else None
     marches: list[dict[str, March]] = []
     ours: list[float] = []
     with pinned():
-        seconds_per_case_step(model, spec, motion, (1, 2))  # compiles
+        simulate_cases(model, [spec], [motion[:2]])  # compiles
         for _ in range(runs):
             if contact is not None:
                 case = Case(model, spec, motion[: setting.peer_steps + 1])
                 marches.append({solver: march(case, contact, solver) for solver in SOLVERS})
-            ours.append(seconds_per_case_step(model, spec, motion, OUR_STEPS))
+            ours.append(1e-6 * time_loop(model, spec, motion[: OUR_STEPS + 1]).case_step_us)
     row = Row(
         mesh=setting.mesh,
         loading=setting.loading.name,
@@ -123,19 +119,6 @@ def measured(setting: Setting, runs: int) -> Row:
         peer_steps=0,
     )
     return _beside(row, marches, ours, _history(model, spec, motion[: setting.peer_steps + 1])) if marches else row
-
-
-def seconds_per_case_step(model: Model, spec: Spec, motion: Floats, steps: tuple[int, int]) -> float:
-    """Processor time of the time loop of a full batch, from marches of two lengths."""
-    sparing = replace(model, spec=spec.model_copy(update={"output": Output(every=20)}))
-    seconds = []
-    for n in steps:
-        with Stopwatch() as stopwatch:
-            response = simulate_cases(sparing, [sparing.spec] * LANES, [scale * motion[: n + 1] for scale in SCALES])
-        if (response.status >= Status.NOT_CONVERGED).any():
-            raise RuntimeError(f"a case of the batch failed: {response.reason}")
-        seconds.append(stopwatch.seconds)
-    return (seconds[1] - seconds[0]) / ((steps[1] - steps[0]) * LANES)
 
 
 def agreement(theirs: Floats, ours: Floats) -> float:
@@ -183,12 +166,13 @@ HEADINGS = (
 
 def lines(rows: list[Row]) -> list[str]:
     """The table in text, one line a row under a line of headings."""
-    cells = [HEADINGS, *(_cells(row) for row in rows)]
-    widths = [max(len(line[k]) for line in cells) for k in range(len(HEADINGS))]
-    return ["  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells]
+    texts = [HEADINGS, *(cells(row) for row in rows)]
+    widths = [max(len(line[k]) for line in texts) for k in range(len(HEADINGS))]
+    return ["  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in texts]
 
 
-def _cells(row: Row) -> tuple[str, ...]:
+def cells(row: Row) -> tuple[str, ...]:
+    """A row in text."""
     first = (row.mesh, row.loading, f"{row.dof}", f"{row.points}")
     ours = f"{row.ours_us:.1f}"
     if row.ratio is None or row.iterations is None or row.agreement is None:

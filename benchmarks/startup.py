@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -38,12 +38,12 @@ def seconds_cold() -> float:
         return _seconds(["-c", "import engine; engine.compile_kernels()"], {"NUMBA_CACHE_DIR": folder})
 
 
-def _seconds(arguments: Sequence[str], environment: Mapping[str, str] | None = None) -> float:
+def _seconds(arguments: Sequence[str], environment: dict[str, str] | None = None) -> float:
     """Wall time [s] of Python with these arguments, as a user's shell would start it: with its bytecode kept."""
     kept = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     path = os.pathsep.join(filter(None, (str(ROOT), kept.get("PYTHONPATH"))))
     start = time.perf_counter()
     subprocess.run(
-        [sys.executable, *arguments], env=kept | {"PYTHONPATH": path} | (environment or {}), capture_output=True, check=True
+        [sys.executable, *arguments], env=kept | {"PYTHONPATH": path} | dict(environment or {}), capture_output=True, check=True
     )
     return time.perf_counter() - start

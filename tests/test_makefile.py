@@ -118,6 +118,18 @@ def test_the_comparison_is_drawn_whether_opensees_can_be_installed_or_not(checko
     assert (checkout / "calls").read_text().splitlines()[-1] == "-m benchmarks.versus"
 
 
+@pytest.mark.parametrize(
+    ("target", "module", "needs"), [("bench", "benchmarks", ".[peer]"), ("bench-large", "benchmarks.large", ".")]
+)
+def test_benchmarks_install_what_they_measure(checkout, target, module, needs):
+    command(checkout, "my python", RECORDS_ITS_CALLS)
+    done = make(checkout, target, f"PYTHON={checkout}/commands/my python", path=os.defpath)
+    assert (done.returncode, done.stderr) == (0, "")
+    *_, install, run = (checkout / "calls").read_text().splitlines()
+    assert install.endswith(f"--editable {needs}")
+    assert run == f"-m {module}"
+
+
 def test_windows_has_its_own_folder_for_commands(checkout):
     assert ".venv/Scripts/python -m pip" in make(checkout, "-n", "install", "OS=Windows_NT").stdout
     assert ".venv/bin/python -m pip" in make(checkout, "-n", "install").stdout

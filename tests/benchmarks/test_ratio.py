@@ -13,7 +13,7 @@ N_STEP = 20
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
-    monkeypatch.setattr(ratio, "OUR_STEPS", (5, 305))
+    monkeypatch.setattr(ratio, "OUR_STEPS", 300)
     monkeypatch.setattr(ratio, "SETTINGS", (Setting("paper", STICKING, PLAIN, N_STEP),))
 
 
