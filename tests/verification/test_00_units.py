@@ -212,7 +212,8 @@ def test_a_shaken_box_with_joints_is_the_same_in_both_units(order):
     work = N_CM.force * N_CM.length
     same(si.joint_work, cm.joint_work / work, "joint work")
     same(si.principal_extremes, cm.principal_extremes * to_pascal, "principal stresses")
-    same(si.contact_drift, cm.contact_drift, "contact drift")
+    # A difference of works of joints that is told over all works: as exact as these, not as itself.
+    np.testing.assert_allclose(si.contact_drift, cm.contact_drift, rtol=0, atol=EXACT)
     np.testing.assert_array_equal(cm.states, si.states)
     np.testing.assert_allclose(cm.fractions, si.fractions, rtol=0, atol=EXACT)  # rounding of the lengths
     np.testing.assert_array_equal(cm.first_slip, si.first_slip)
