@@ -17,7 +17,7 @@ from .uplift import uplift_over_weight
 SECONDS_PER_STEP_AND_DOF = 0.4e-6
 """Of a batch, whether it holds one case or sixteen; for the estimate of `check`, measured by runs of `p0` and `damping`."""
 
-SECONDS_PER_STEP_AND_POINTS = 2.2e-8
+SECONDS_PER_STEP_AND_POINTS = 1.0e-8
 """Of a case: the joint solve, which grows with the square of the joint points."""
 
 
