@@ -10,7 +10,7 @@ import numpy as np
 
 from .jit import LANES, kernel
 from .joint import slip_after
-from .sparse import Rows
+from .sparse import Rows, row_product
 from .vector import load, plus_product, store, zeros
 
 INPUT, KINETIC, STRAIN, DAMPING, JOINT, JOINT_ELASTIC, FRICTION, JOINT_DAMPING = range(8)
@@ -85,15 +85,6 @@ class Start(NamedTuple):
 
 
 @kernel
-def _row_product(A, i, x):
-    """Row i of A times x (n, LANES)."""
-    total = zeros()
-    for k in range(A.indptr[i], A.indptr[i + 1]):
-        total = plus_product(total, A.values[k], load(x, A.indices[k]))
-    return total
-
-
-@kernel
 def known_part(rates):
     """Factors of u, v, a in q, the part of u⁺ that is known before the step."""
     share = rates.beta / (1.0 + rates.a1 * rates.beta)
@@ -115,7 +106,7 @@ def effective_load(M, loads, ground, w, y):
     for i in range(y.shape[0]):
         total = plus_product(load(loads.standing, i), -loads.inertia[0, i], gx)
         total = plus_product(total, -loads.inertia[1, i], gy)
-        store(y, i, plus_product(total, 1.0, _row_product(M, i, w)))
+        store(y, i, plus_product(total, 1.0, row_product(M, i, w)))
 
 
 @kernel
@@ -136,7 +127,7 @@ def commit(rates, matrices, loads, ground, motion, step, energy):
     _advance(rates, loads, ground, motion, step, energy)
     C, work = matrices.C, load(energy, DAMPING)
     for i in range(step.y.shape[0]):
-        work = plus_product(work, _row_product(C, i, step.mean), load(step.y, i))
+        work = plus_product(work, row_product(C, i, step.mean), load(step.y, i))
     store(energy, DAMPING, work)
 
 
@@ -197,7 +188,7 @@ def _kinetic(M, v, result):
     """result = 1/2 vᵀ M v of every lane: v (n, LANES), result (1, LANES)."""
     total = zeros()
     for i in range(v.shape[0]):
-        total = plus_product(total, _row_product(M, i, v), load(v, i))
+        total = plus_product(total, row_product(M, i, v), load(v, i))
     store(result, 0, plus_product(zeros(), 0.5, total))
 
 
@@ -208,7 +199,7 @@ def _strain_change(K, u, start, change, result):
         store(change, i, plus_product(load(u, i), -1.0, load(start.u, i)))
     total = zeros()
     for i in range(u.shape[0]):
-        force = plus_product(load(start.Ku, i), 0.5, _row_product(K, i, change))
+        force = plus_product(load(start.Ku, i), 0.5, row_product(K, i, change))
         total = plus_product(total, force, load(change, i))
     store(result, 0, total)
 

@@ -17,13 +17,19 @@ class Rows(NamedTuple):
 
 
 @kernel
+def row_product(A, i, x):
+    """Row i of A times x (n_columns, LANES), for every lane."""
+    total = zeros()
+    for k in range(A.indptr[i], A.indptr[i + 1]):
+        total = plus_product(total, A.values[k], load(x, A.indices[k]))
+    return total
+
+
+@kernel
 def product(A, x, y):
     """y = A x for every lane: x (n_columns, LANES), y (n_rows, LANES)."""
     for i in range(y.shape[0]):
-        total = zeros()
-        for k in range(A.indptr[i], A.indptr[i + 1]):
-            total = plus_product(total, A.values[k], load(x, A.indices[k]))
-        store(y, i, total)
+        store(y, i, row_product(A, i, x))
 
 
 @kernel
