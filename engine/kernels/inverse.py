@@ -288,14 +288,19 @@ def _border(inverse, count, work):
 
 
 @kernel
-def _wait_to_go(inverse, state, queue):
-    """Degrees of freedom whose forces are no unknowns in `state`; their number."""
+def _is_unknown(state, i):
+    """Whether the force of degree of freedom i is an unknown where its point is in `state`."""
+    return state == STICK or (state != OPEN and i % 2 == 0)
+
+
+@kernel
+def _wait(inverse, state, coming, queue):
+    """Degrees of freedom whose forces become unknowns in `state` or, where not `coming`, stop being ones; their number."""
     count = 0
-    for p in range(state.shape[0]):
-        for i in range(2 * p, 2 * p + 2):
-            if inverse.place[i] >= 0 and (state[p] == OPEN or (i % 2 == 1 and state[p] != STICK)):
-                queue[count] = i
-                count += 1
+    for i in range(2 * state.shape[0]):
+        if _is_unknown(state[i // 2], i) == coming and (inverse.place[i] >= 0) != coming:
+            queue[count] = i
+            count += 1
     return count
 
 
@@ -312,18 +317,6 @@ def _wait_for_ties(points, inverse, state, queue):
 
 
 @kernel
-def _wait_to_come(inverse, state, queue):
-    """Degrees of freedom whose forces become unknowns in `state`; their number."""
-    count = 0
-    for p in range(state.shape[0]):
-        for i in range(2 * p, 2 * p + 2):
-            if inverse.place[i] < 0 and state[p] != OPEN and (i % 2 == 0 or state[p] == STICK):
-                queue[count] = i
-                count += 1
-    return count
-
-
-@kernel
 def updated(points, inverse, state, work):
     """Bring the inverse to `state`; False where it must be built anew."""
     changed = 0
@@ -336,13 +329,13 @@ def updated(points, inverse, state, work):
     if changed > REBUILD_FROM * inverse.size[0] + BLOCK:
         return False
     good, queue = True, work.queue
-    count = _wait_to_go(inverse, state, queue)
+    count = _wait(inverse, state, False, queue)
     for first in range(0, count, BLOCK):
         good = good and _remove(inverse, queue[first : min(first + BLOCK, count)], work)
     count = _wait_for_ties(points, inverse, state, queue)
     for first in range(0, count, BLOCK):
         good = good and _retie(points, inverse, queue[first : min(first + BLOCK, count)], state, work)
-    count = _wait_to_come(inverse, state, queue)
+    count = _wait(inverse, state, True, queue)
     for first in range(0, count, BLOCK):
         good = good and _append(points, inverse, queue[first : min(first + BLOCK, count)], state, work)
     inverse.state[:] = state
@@ -381,7 +374,7 @@ def _number(points, inverse, state):
     for p in range(state.shape[0]):
         for i in range(2 * p, 2 * p + 2):
             inverse.place[i] = -1
-            if state[p] != OPEN and (i % 2 == 0 or state[p] == STICK):
+            if _is_unknown(state[p], i):
                 inverse.unknown[n], inverse.place[i] = i, n
                 inverse.tie[n] = _tie(points, state[p], p) if i % 2 == 0 else 0.0
                 n += 1
