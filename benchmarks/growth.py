@@ -16,6 +16,7 @@ from .clock import pinned
 from .loop import time_loop
 from .models import DT, MESHES, STICKING, shaking, spec_of
 from .process import apart, peak_gib
+from .rows import told
 
 SMALLEST = MeshOptions(
     order=1,
@@ -49,12 +50,7 @@ class GrowthRow:
 
 def growth_table(seen: Callable[[GrowthRow], None] | None = None) -> list[GrowthRow]:
     """All meshes of three-node triangles; `seen` is called with every row as soon as it is there."""
-    rows = []
-    for mesh in GROWING:
-        rows.append(GrowthRow(**apart(measured, mesh)))
-        if seen is not None:
-            seen(rows[-1])
-    return rows
+    return told((GrowthRow(**apart(measured, mesh)) for mesh in GROWING), seen)
 
 
 def measured(mesh: str) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from engine.mesh import Floats
 from .clock import Stopwatch, pinned
 from .models import MESHES, STICKING, spec_of
 from .process import apart
+from .rows import told
 
 SECONDS = 0.1
 """Of solves between two of dgemm."""
@@ -55,12 +56,7 @@ class LaneRow:
 
 def lane_table(runs: int = 7, seen: Callable[[LaneRow], None] | None = None) -> list[LaneRow]:
     """Every mesh in a process of its own; `seen` is called with every row as soon as it is there."""
-    rows = []
-    for mesh in MESHES:
-        rows.append(LaneRow(**apart(measured, mesh, str(runs))))
-        if seen is not None:
-            seen(rows[-1])
-    return rows
+    return told((LaneRow(**apart(measured, mesh, str(runs))) for mesh in MESHES), seen)
 
 
 def fraction_of_dgemm(rows: list[LaneRow]) -> dict[int, float]:

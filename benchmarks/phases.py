@@ -11,6 +11,7 @@ from .clock import pinned
 from .loop import TimeLoop, time_loop
 from .models import DT, MESHES, shaking, spec_of
 from .ratio import SETTINGS, Setting
+from .rows import told
 
 STEPS = 500
 GOAL = 1.0
@@ -29,12 +30,7 @@ class PhaseRow:
 
 def phase_table(runs: int = 3, seen: Callable[[PhaseRow], None] | None = None) -> list[PhaseRow]:
     """Measure all settings; `seen` is called with every row as soon as it is there."""
-    rows = []
-    for setting in SETTINGS:
-        rows.append(measured(setting, runs))
-        if seen is not None:
-            seen(rows[-1])
-    return rows
+    return told((measured(setting, runs) for setting in SETTINGS), seen)
 
 
 def measured(setting: Setting, runs: int) -> PhaseRow:

@@ -17,6 +17,7 @@ from .clock import pinned
 from .loop import time_loop
 from .models import DT, MESHES, OPENING, SLIDING, STICKING, Loading, shaking, spec_of
 from .peer import PLAIN, REMEMBERING, SOLVERS, Case, Contact, March, march, opensees
+from .rows import told
 
 OUR_STEPS = 500
 
@@ -73,12 +74,7 @@ class Row:
 
 def ratio_table(runs: int = 3, seen: Callable[[Row], None] | None = None) -> list[Row]:
     """Measure all settings; `seen` is called with every row as soon as it is there. Some four minutes with OpenSeesPy."""
-    rows = []
-    for setting in SETTINGS:
-        rows.append(measured(setting, runs))
-        if seen is not None:
-            seen(rows[-1])
-    return rows
+    return told((measured(setting, runs) for setting in SETTINGS), seen)
 
 
 def ratio_to_opensees(rows: list[Row]) -> dict[int, float]:
