@@ -101,6 +101,16 @@ class Study:
         marched = (tuple(group[i : i + LANES]) for group in groups.values() for i in range(0, len(group), LANES))
         return tuple(Batch(cases, tuple(f for case in cases for f in followers.get(case, ()))) for cases in marched)
 
+    def halves(self, batch: Batch) -> tuple[Batch, ...]:
+        """The two halves of a batch, each case with those that follow from it; none where a single case marches."""
+        if len(batch.cases) == 1:
+            return ()
+        middle = len(batch.cases) // 2
+        return tuple(
+            Batch(cases, tuple(f for f in batch.followers if self.scaling.solved_as[f] in cases))
+            for cases in (batch.cases[:middle], batch.cases[middle:])
+        )
+
 
 def shared(spec: Spec) -> str:
     """What cases of one batch have in common: all but pressure, motion, gravity and friction, which are a lane's own."""

@@ -1,89 +1,38 @@
-"""Executes the batches of a study, one process a core, and writes the dataset."""
+"""Executes the batches of a study that are not on disk yet, one process a core, and merges them to one dataset."""
 
 import os
-import signal
+import time
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from itertools import islice
-from multiprocessing import active_children, get_context
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-import numpy as np
 import xarray as xr
 
-from engine import (
-    MeshError,
-    Model,
-    Spec,
-    Status,
-    Trace,
-    build_model,
-    carried_down,
-    compile_kernels,
-    free_field,
-    response_spectrum,
-    simulate_cases,
-)
+from engine import Status, compile_kernels
 
-from .dataset import build_dataset, case_arrays, with_followers
+from .batch import Job, Progress
+from .dataset import COMPRESSED, Part, build_dataset, write_dataset_of
 from .domain_size import with_convergence
+from .files import clear_parts, whole
 from .messages import StudyError
-from .plan import Batch, Study, load_study, shared
-from .uplift import uplift_over_weight
+from .plan import Batch, Study, load_study
+from .pool import Broken, Crew, StartError, out_of_memory
+from .sizes import DomainSizes
+from .store import Entry, Names, Store, opened
+from .work import Ended, Task, carry_out
 
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+TRIES = 3
+"""After so many losses of the process that computes it, a case by itself is given up."""
 
-TRIES_ALONE = 2
-"""How often a batch is tried by itself after the pool it ran in has broken."""
+TRIES_TOGETHER = 2
+"""After so many, a batch of several cases is split in two."""
 
-JOBS_A_WORKER = 2
-"""Jobs that are made ahead, the one that runs included."""
-
-Progress = Callable[[int], None]
-"""Told how many case-steps have been done since it was last called."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """What is to be computed of one batch.
-
-    specs, motions : of all its cases; base accelerations (n_step + 1, 2) [m/s²] as the study gives them
-    n_marched : how many of them march; each further one is the response of a `lane` among these times its `factor`
-    """
-
-    specs: list[Spec]
-    motions: list[np.ndarray]
-    n_marched: int
-    lane: np.ndarray
-    factor: np.ndarray
-
-    @classmethod
-    def of(cls, study: Study, batch: Batch) -> "Job":
-        """The job of a batch of a study."""
-        cases, scaling, followers = batch.all_cases, study.scaling, list(batch.followers)
-        lane = np.array([batch.cases.index(case) for case in scaling.solved_as[followers]], dtype=int)
-        motions = [study.ground(case) for case in cases]
-        return cls([study.cases[case] for case in cases], motions, len(batch.cases), lane, scaling.scaled_by[followers])
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What one batch gives."""
-
-    model: Model
-    arrays: dict[str, np.ndarray]
-
-
-@dataclass(frozen=True)
-class Lost:
-    """A batch that gave nothing, and why; its cases become NaN with this status."""
-
-    status: Status
-    reason: str
+MANIFEST_EVERY = 30.0
+"""[s] between two writings of the manifest while batches come in."""
 
 
 def run(source: str | Path, workers: int | None = None) -> xr.Dataset:
@@ -92,218 +41,214 @@ def run(source: str | Path, workers: int | None = None) -> xr.Dataset:
 
 
 def run_study(study: Study, workers: int | None = None, progress: Progress | None = None) -> xr.Dataset:
-    """Run all batches of a study; `workers` processes, as many as cores by default."""
-    outcomes: dict[int, Outcome | Lost] = {}
-    for i, outcome in _outcomes(study, workers or os.cpu_count() or 1, progress or (lambda steps: None)):
-        outcomes[i] = outcome
-    whole = next((outcome for outcome in outcomes.values() if isinstance(outcome, Outcome)), None)
-    if whole is None:
-        raise StudyError(
-            sorted({f"{study.name}: {outcome.reason}" for outcome in outcomes.values() if isinstance(outcome, Lost)})
-        )
-    owner = np.zeros((len(study.cases), 2), dtype=int)
-    found = []
-    for b, batch in enumerate(study.batches):
-        outcome = outcomes[b]
-        own = _emptied(whole, len(batch.all_cases), outcome) if isinstance(outcome, Lost) else outcome
-        found.append(replace(own, arrays=own.arrays | _origin(study, batch)))
-        for place, case in enumerate(batch.all_cases):
-            owner[case] = b, place
-    ds = build_dataset(study, [each.model for each in found], [each.arrays for each in found], owner)
+    """Run all batches of a study; `workers` processes, as many as cores by default. Its batches are on disk meanwhile."""
+    with TemporaryDirectory(prefix="coralquake-", ignore_cleanup_errors=True) as folder:
+        ds = build_dataset(study, Run(study, Store(Path(folder))).carried_out(workers, progress))
     return with_convergence(ds, study.sizes) if study.sizes else ds
 
 
-def _origin(study: Study, batch: Batch) -> dict[str, np.ndarray]:
-    """Of which case, counted from 1, each of a batch is a multiple, and by what factor."""
-    cases = list(batch.all_cases)
-    return {"solved_as": study.scaling.solved_as[cases] + 1, "scaled_by": study.scaling.scaled_by[cases]}
+def run_into(path: Path, study: Study, workers: int | None, watch: Callable[["Run"], Progress], fresh: bool = False) -> None:
+    """Run what is left of a study and write its results file. Its batches stay beside it, for this study and longer ones.
 
-
-def _emptied(whole: Outcome, n_case: int, lost: Lost) -> Outcome:
-    """An outcome of the form of `whole` with NaN for all that a lost batch did not give."""
-    arrays = {name: np.full((n_case, *array.shape[1:]), np.nan) for name, array in whole.arrays.items() if name != "time"}
-    arrays |= {"time": whole.arrays["time"], "status": np.full(n_case, lost.status)}
-    arrays["reason"] = np.array([lost.reason] * n_case, dtype=object)
-    return Outcome(whole.model, arrays)
-
-
-def _outcomes(study: Study, workers: int, progress: Progress) -> Iterator[tuple[int, Outcome | Lost]]:
-    left = list(range(len(study.batches)))
-    if min(workers, len(left)) == 1:
-        for i in left:
-            yield i, _guarded(Job.of(study, study.batches[i]), progress)
-        return
-    compile_kernels()  # once, not in every process
-    models: dict[str, Model] = {}
-    with _one_thread():
-        for i, outcome in _in_pool(study, tuple(left), min(workers, len(left))):
-            progress(study.batch_steps(i))
-            left.remove(i)
-            yield i, _with_one_model(models, outcome)
-        for i in left:  # a worker was lost and took the pool with it: each batch left gets a pool of its own
-            yield i, _with_one_model(models, _alone(study, i))
-            progress(study.batch_steps(i))
-
-
-def _with_one_model(models: dict[str, Model], outcome: Outcome | Lost) -> Outcome | Lost:
-    """The outcome with the one model of all that share it, each of which came with a copy from its process."""
-    if isinstance(outcome, Lost):
-        return outcome
-    return replace(outcome, model=models.setdefault(shared(outcome.model.spec), outcome.model))
-
-
-def _in_pool(study: Study, batches: tuple[int, ...], workers: int) -> Iterator[tuple[int, Outcome | Lost]]:
-    """Outcomes as they come; ends early where a worker is lost, which breaks the whole pool.
-
-    No more jobs are made than keep all workers busy: their motions need not wait in memory.
+    watch : called once with what there is, returns what is told of the progress. StudyError where another run is at it or no
+    case could be computed; OSError where something cannot be written.
     """
-    waiting = iter(batches)
-    running: dict[Future[Outcome | Lost], int] = {}
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent) as pool:
-        try:
-            while True:
-                with suppress(BrokenProcessPool):
-                    for i in islice(waiting, JOBS_A_WORKER * workers - len(running)):
-                        running[pool.submit(_guarded, Job.of(study, study.batches[i]))] = i
-                if not running:
-                    return
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    i = running.pop(future)
-                    with suppress(BrokenProcessPool):
-                        yield i, future.result()
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in active_children():
-                child.terminate()
-            raise
-
-
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _alone(study: Study, batch: int) -> Outcome | Lost:
-    for _ in range(TRIES_ALONE):
-        for _, outcome in _in_pool(study, (batch,), 1):
-            return outcome
-    return Lost(Status.WORKER_LOST, f"the process that computed it was lost {1 + TRIES_ALONE} times")
-
-
-def _guarded(job: Job, progress: Progress | None = None) -> Outcome | Lost:
-    """`run_batch`, with what stops it told as a reason instead of stopping the other batches."""
-    try:
-        return run_batch(job, progress)
-    except (MeshError, MemoryError, ArithmeticError, np.linalg.LinAlgError, RuntimeError) as error:
-        return Lost(Status.NOT_RUN, f"could not be computed: {error or type(error).__name__}")
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Processes started inside find one thread for linear algebra in their environment."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def run_batch(job: Job, progress: Progress | None = None) -> Outcome:
-    """March one batch with its free field, and gather what the dataset holds of all its cases."""
-    n, specs = job.n_marched, job.specs[: job.n_marched]
-    model = _model(_Sharing(shared(specs[0]), specs[0]))
-    depths = [_depth_of_the_record(spec) for spec in job.specs]
-    motions = _at_the_base(model, job.motions, depths)
-    told = 0
-
-    def tell(step: int) -> None:
-        nonlocal told
-        if progress is not None:
-            progress((step - told) * len(specs))
-        told = step
-
-    response = simulate_cases(model, specs, motions[:n], tell)
-    tell(len(motions[0]) - 1)
-    field = free_field(model, motions[:n], depths[:n])
-    each = _of_each_case(job.specs, motions)
-    extra = {name: values[:n] for name, values in each.items()} | {
-        "racking_free_field": field.racking,
-        "peak_racking_free_field": field.peak,
-        "reference_displacement": field.reference,
-    }
-    return Outcome(model, with_followers(case_arrays(model, response, extra), job.lane, job.factor) | each)
-
-
-def _of_each_case(specs: list[Spec], motions: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """What is known of cases without marching them; motions (n_step + 1, 2) [m/s²] at the base."""
-    time, every = specs[0].time, specs[0].output.every
-    return {
-        "base_acceleration": np.array([motion[::every] for motion in motions]),
-        "peak_base_acceleration": np.array([np.abs(motion).max(axis=0) for motion in motions]),
-        "response_spectrum": np.array([_spectrum(motion.tobytes(), time.dt) for motion in motions]),
-        "uplift_over_weight": np.array([uplift_over_weight(spec) for spec in specs]),
-    }
-
-
-def trace_case(study: Study, case: int, tell: Callable[[Trace, Model], None]) -> tuple[Status, str]:
-    """March one case by itself and tell every step of it; how it ended, and why where it failed."""
-    spec = study.cases[case]
-    model = build_model(spec)
-    motions = _at_the_base(model, [study.ground(case)], [_depth_of_the_record(spec)])
-    response = simulate_cases(model, [spec], motions, trace=lambda step: tell(step, model))
-    return Status(response.status[0]), response.reason[0]
-
-
-@dataclass(frozen=True)
-class _Sharing:
-    """Cases that share a model, and one of them."""
-
-    what: str
-    spec: Spec = field(compare=False)
-
-
-@lru_cache(maxsize=1)
-def _model(of: _Sharing) -> Model:
-    """The model of a batch; the next one of the same process often shares it."""
-    return build_model(of.spec)
-
-
-@lru_cache(maxsize=64)
-def _spectrum(motion: bytes, dt: float) -> np.ndarray:
-    """Response spectrum (n_period, 2) of a base motion; most cases of a study share theirs with others."""
-    return response_spectrum(np.frombuffer(motion).reshape(-1, 2), dt)
-
-
-def _depth_of_the_record(spec: Spec) -> float:
-    return spec.motion.reference_depth or spec.domain.depth
-
-
-def _at_the_base(model: Model, motions: list[np.ndarray], depths: list[float]) -> list[np.ndarray]:
-    """The base motions that move the free field as `motions` at the depth of each; the modes of a depth are found once."""
-    found = list(motions)
-    for depth in dict.fromkeys(depths):
-        if depth != model.spec.domain.depth:
-            lanes = [lane for lane, other in enumerate(depths) if other == depth]
-            for lane, base in zip(lanes, carried_down(model, [motions[lane] for lane in lanes], depth), strict=True):
-                found[lane] = base
-    return found
+    store = Store.beside(path)
+    with store.locked():
+        if fresh:
+            store.keep_only(set())
+        run = Run(study, store)
+        clear_parts(path.parent, path.name)
+        parts = run.carried_out(workers, watch(run), apart=True)
+        with _written(path) as part:
+            write_dataset_of(study, parts, part)
+            if study.sizes:
+                _add_convergence(part, study.sizes)
+        store.keep_only({entry.name for entry in run.entries})
 
 
 def write_dataset(ds: xr.Dataset, path: Path) -> None:
-    """Write a netCDF-4 file: under another name first, flushed to disk, then renamed, so that it is whole or not there."""
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # two runs into one file: the last one's stays
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write a dataset that is in memory to a netCDF-4 file, which is whole or not there; OSError where that fails."""
     numeric = [name for name in ds.data_vars if ds[name].dtype.kind == "f" and ds[name].ndim]
+    with _written(path) as part:
+        ds.to_netcdf(part, engine="netcdf4", encoding=dict.fromkeys(numeric, COMPRESSED))
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[Path]:
+    """As `files.whole`, for netCDF4, which tells of a full disk as RuntimeError."""
     try:
-        ds.to_netcdf(part, engine="netcdf4", encoding={name: {"zlib": True, "complevel": 1} for name in numeric})
-        with part.open("rb+") as file:
-            os.fsync(file.fileno())
-        part.replace(path)
-    except RuntimeError as error:  # as netCDF4 tells of a full disk
-        raise OSError(f"{error}; is the disk full?") from None
-    finally:
-        part.unlink(missing_ok=True)
+        with whole(path) as part:
+            yield part
+    except RuntimeError as error:
+        raise OSError(None, f"{error}; is the disk full?", str(path)) from None
+
+
+def _add_convergence(path: Path, sizes: DomainSizes) -> None:
+    """What the iterative boundary method finds, added to the file of its study."""
+    with xr.open_dataset(path, engine="netcdf4") as ds:
+        found = with_convergence(ds, sizes)
+        new = found[[name for name in found.data_vars if name not in ds]].load()
+    new.to_netcdf(path, mode="a", engine="netcdf4")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A batch, or a part of one, that is left to compute, and how often the process at it was lost."""
+
+    name: str
+    batch: Batch
+    losses: int = 0
+
+
+class Run:
+    """The batches of a study: those that are on disk and those that are left."""
+
+    def __init__(self, study: Study, store: Store) -> None:
+        self.study, self.store = study, store
+        self._names = Names(study)
+        self._left: deque[Piece] = deque()
+        self._entries: dict[str, Entry] = {}
+        self._told: Counter[str] = Counter()
+        self._next_manifest = 0.0
+        on_disk = store.names()
+        for batch in study.batches:
+            self._find(batch, on_disk)
+        self.n_there = len(self._entries) - len(self._left)
+        self.steps_left = sum(map(self._steps, self._left))
+
+    @property
+    def entries(self) -> list[Entry]:
+        """One a file, in the order of the cases."""
+        return sorted(self._entries.values(), key=lambda entry: min(entry.cases))
+
+    @property
+    def n_done(self) -> int:
+        """How many of the entries have ended."""
+        return sum(1 for entry in self._entries.values() if entry.status)
+
+    def _find(self, batch: Batch, on_disk: set[str]) -> None:
+        """Sort a batch in; one of which parts are there is these parts."""
+        name = self._names.of(batch)
+        if self.store.holds(name):
+            with opened(self.store.path(name)) as (header, _):
+                self._entries[name] = Entry(name, batch.all_cases, tuple(header.status), tuple(header.reason))
+        elif self._is_in_parts(batch, on_disk):
+            for half in self.study.halves(batch):
+                self._find(half, on_disk)
+        else:
+            self._add(Piece(name, batch))
+
+    def _is_in_parts(self, batch: Batch, on_disk: set[str]) -> bool:
+        return bool(on_disk) and any(
+            self._names.of(half) in on_disk or self._is_in_parts(half, on_disk) for half in self.study.halves(batch)
+        )
+
+    def _add(self, piece: Piece) -> None:
+        self._entries[piece.name] = Entry(piece.name, piece.batch.all_cases)
+        self._left.append(piece)
+
+    def _steps(self, piece: Piece) -> int:
+        return sum(self.study.steps(case) for case in piece.batch.cases)
+
+    def carried_out(self, workers: int | None, progress: Progress | None, apart: bool = False) -> list[Part]:
+        """Compute what is left. StudyError where nothing comes of any case, OSError where a file cannot be written.
+
+        A single worker and a single batch are computed in this process; `apart`: batches of a larger study never are, so that
+        one that kills its process does not end the others.
+        """
+        size = min(workers or os.cpu_count() or 1, len(self.study.batches))
+        alone = size == 1 and not (apart and len(self.study.batches) > 1)
+        tell = progress or (lambda steps: None)
+        self._tell_manifest()
+        try:
+            if alone:
+                self._compute_here(tell)
+            elif self._left:
+                self._compute_apart(min(size, len(self._left)), tell)
+        finally:
+            with suppress(OSError):  # what stopped the run is told, not that this fails too
+                self.store.write_manifest(self.study, self.entries)
+        found = [Part(entry.cases, self.store.path(entry.name), entry.status, entry.reason) for entry in self.entries]
+        if not any(part.is_there for part in found):
+            raise StudyError(sorted({f"{self.study.name}: {reason}" for part in found for reason in part.reason}))
+        return found
+
+    def _compute_here(self, progress: Progress) -> None:
+        while self._left:
+            piece, task = self._next()
+            self.store.note("begun", piece.name)
+            try:
+                answer: Ended | Broken = carry_out(task, partial(self._tell, progress, piece))
+            except MemoryError as error:
+                answer = Broken(out_of_memory(error))
+            self._settle(piece, answer, progress)
+
+    def _compute_apart(self, size: int, progress: Progress) -> None:
+        """One task is made ahead: its motions wait in memory, a process that becomes free does not wait for it."""
+        compile_kernels()  # once, not in every process
+        ahead: tuple[Piece, Task] | None = None
+        try:
+            with Crew(size, carry_out) as crew:
+                while self._left or ahead or crew.busy:
+                    if self._left and not ahead:
+                        ahead = self._next()
+                    if ahead and crew.free:
+                        self.store.note("begun", ahead[0].name)
+                        crew.give(*ahead)
+                        ahead = None
+                        continue
+                    for piece, answer in crew.answers(partial(self._tell, progress)):
+                        self._settle(piece, answer, progress)
+        except StartError as error:
+            hint = 'in a script, what runs a study stands below `if __name__ == "__main__":`'
+            raise StudyError([f"{self.study.name}: {error}; {hint}"]) from None
+
+    def _next(self) -> tuple[Piece, Task]:
+        piece = self._left.popleft()
+        return piece, Task(Job.of(self.study, piece.batch), self.store.path(piece.name))
+
+    def _tell(self, progress: Progress, piece: Piece, steps: int) -> None:
+        self._told[piece.name] += steps
+        progress(steps)
+
+    def _settle(self, piece: Piece, answer: Ended | Broken, progress: Progress) -> None:
+        """Note what came of a piece, and what is to be done with one whose process was lost."""
+        told = self._told.pop(piece.name, 0)
+        if isinstance(answer, Ended):
+            self.store.note("ended", piece.name)
+            self._end(piece, answer.status, answer.reason)
+        else:
+            self.store.note("lost", piece.name, reason=answer.reason)
+            if not self._give_up(piece, answer.reason):
+                progress(-told)
+                return
+        progress(self._steps(piece) - told)
+        self._tell_manifest()
+
+    def _end(self, piece: Piece, status: tuple[int, ...], reason: tuple[str, ...]) -> None:
+        self._entries[piece.name] = Entry(piece.name, piece.batch.all_cases, status, reason)
+
+    def _give_up(self, piece: Piece, reason: str) -> bool:
+        """Put a lost piece, or its halves, at the end of those that are left; a case by itself that is lost too often is not."""
+        again = replace(piece, losses=piece.losses + 1)
+        if len(piece.batch.cases) == 1 and again.losses >= TRIES:
+            n = len(piece.batch.all_cases)
+            self._end(
+                piece,
+                (Status.WORKER_LOST,) * n,
+                (f"the process that computed it {reason}; given up after {again.losses} tries",) * n,
+            )
+            return True
+        if len(piece.batch.cases) > 1 and again.losses >= TRIES_TOGETHER:
+            del self._entries[piece.name]
+            for half in self.study.halves(piece.batch):
+                self._add(Piece(self._names.of(half), half, again.losses))
+        else:
+            self._add(again)
+        return False
+
+    def _tell_manifest(self) -> None:
+        if (now := time.monotonic()) >= self._next_manifest:
+            self.store.write_manifest(self.study, self.entries)
+            self._next_manifest = now + MANIFEST_EVERY

@@ -16,6 +16,7 @@ class Variable:
     single : whether single precision does; whole : whether it is a whole number that stands for nothing else
     degree : the power of a factor on all loads by which it grows (D13); None: found for every case by itself
     of_motion : whether it follows from the motion at the base, so that it carries only the axes along which that changes
+    of_the_mesh : further attributes, by UGRID
     """
 
     dims: tuple[str, ...]
@@ -27,10 +28,16 @@ class Variable:
     single: bool = False
     whole: bool = False
     degree: int | None = 0
+    of_the_mesh: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Whole numbers for flags and for what is counted, floats otherwise."""
+        return np.dtype(np.int8 if self.flags else np.int32 if self.whole else np.float32 if self.single else np.float64)
 
     def attributes(self) -> dict[str, Any]:
         """As netCDF attributes."""
-        found: dict[str, Any] = described(self.unit, self.long_name, self.meaning)
+        found: dict[str, Any] = described(self.unit, self.long_name, self.meaning) | dict(self.of_the_mesh)
         if self.flags:
             found["comment"] = "; ".join(part for part in (self.meaning, "-1: not there") if part)
             found |= {"flag_values": np.arange(len(self.flags), dtype=np.int8), "flag_meanings": " ".join(self.flags)}
@@ -142,7 +149,13 @@ SCHEMA: dict[str, Variable] = {
     "flexibility_ratio": Variable(
         (), "1", "flexibility ratio F of the box", "its shear strain by itself over the ground's, both under one shear stress"
     ),
-    "shape": Variable(("node", "component"), "m", "displacement of all nodes at the moment of the largest racking", degree=1),
+    "shape": Variable(
+        ("node", "component"),
+        "m",
+        "displacement of all nodes at the moment of the largest racking",
+        degree=1,
+        of_the_mesh=(("mesh", "mesh"), ("location", "node")),
+    ),
     "shape_time": Variable((), "s", "moment of the largest racking"),
     "shape_state": Variable(("joint",), "", "joint states at that moment", flags=JOINT_STATES),
     "status": Variable((), "", "how the case ended", flags=tuple(status.name.lower() for status in Status)),
@@ -197,7 +210,32 @@ COORDINATES: dict[str, Variable] = {
     "section_position": Variable(
         ("section",), "m", "distance of the section along the member's clear span", "from its left or lower end"
     ),
+    "mesh_node_x": Variable(("node",), "m", "x of the node"),
+    "mesh_node_y": Variable(("node",), "m", "y of the node"),
 }
+
+MESH: dict[str, Variable] = {name: variable for name, variable in COORDINATES.items() if name not in ("time", "period")} | {
+    "mesh_face_nodes": Variable(
+        ("face", "corner"),
+        "",
+        "nodes of the triangle, round it",
+        of_the_mesh=(("cf_role", "face_node_connectivity"), ("start_index", np.int32(0))),
+    ),
+    "mesh_layer": Variable(
+        ("face",),
+        "",
+        "layer of the triangle",
+        "0 is the layer at the surface; the largest number is the structure",
+        of_the_mesh=(("mesh", "mesh"), ("location", "face")),
+    ),
+    "joint_nodes": Variable(
+        ("joint", "joint_corner"),
+        "",
+        "nodes of the joint element: 1-2 ground, 3-4 structure, with six nodes then the middle ones",
+    ),
+}
+"""Places and topology: what follows from the mesh, so that it carries only the axes along which that changes."""
+
 
 EXTREMES = ("max N", "min N", "max Q", "min Q", "max M", "min M")
 """Labels of the dimension `extreme`, as the engine orders them."""
@@ -207,3 +245,14 @@ def described(unit: str, long_name: str, meaning: str = "") -> dict[str, str]:
     """netCDF attributes; what is empty is left out."""
     found = {"units": unit, "long_name": long_name, "comment": meaning}
     return {key: value for key, value in found.items() if value}
+
+
+TOPOLOGY: dict[str, Any] = {
+    "cf_role": "mesh_topology",
+    "topology_dimension": np.int32(2),
+    "node_coordinates": "mesh_node_x mesh_node_y",
+    "face_node_connectivity": "mesh_face_nodes",
+    "face_dimension": "face",
+    "long_name": "mesh of the cases",
+}
+"""Attributes of the variable `mesh`, by UGRID."""

@@ -66,9 +66,14 @@ def largest_moment(cases: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return moments[row, chosen], names, axial, times
 
 
+SAID = ["status", "closed_before_shaking", "gap_before_shaking", "first_slip", "racking_ratio"]
+SAID += ["extreme_axial_force", "extreme_bending_moment", "extreme_time"]
+"""What the sentences are made of: of a large file nothing else is read for them."""
+
+
 def failures(ds: xr.Dataset) -> list[str]:
     """One line for every case that failed: where in the sweep, and why."""
-    cases = cases_of(ds)
+    cases = cases_of(ds[["status", "reason"]])
     axes = axes_of(ds)
     lines = []
     for i in np.flatnonzero(cases["status"].values >= Status.NOT_CONVERGED):
@@ -79,7 +84,7 @@ def failures(ds: xr.Dataset) -> list[str]:
 
 def sentences(ds: xr.Dataset) -> list[str]:
     """Four sentences from the data: the state before the shaking, the first slip, the racking, the largest bending moment."""
-    done = cases_of(ds)
+    done = cases_of(ds[SAID])
     axes = axes_of(ds) if done.sizes["case"] > 1 else []
     done = done.isel(case=np.flatnonzero(done["status"].values <= Status.SUBSTEPS))
     if done.sizes["case"] == 0:

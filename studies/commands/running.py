@@ -1,7 +1,11 @@
 """run: studies to netCDF files, or one case step by step."""
 
 import os
+import signal
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -11,12 +15,16 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from engine import Status
+
+from ..batch import trace_case
 from ..domain_size import convergence_sentences, is_domain_size, source_sentence
 from ..messages import StudyError
 from ..plan import Study, shipped_studies
 from ..provenance import study_hash
-from ..runner import run_study, trace_case, write_dataset
+from ..runner import Run, run_into
 from ..show import TRACE_HEAD, trace_line
+from ..store import Store
 from ..tables import failures, sentences
 from . import console
 from .console import DONE, INTERRUPTED, SOME_FAILED, load_all, refuse, say
@@ -44,15 +52,16 @@ def run(names: list[str], out_file: Path | None, workers: int | None, fresh: boo
     rows: list[tuple[str, ...]] = []
     failed = False
     for study, path in zip(loaded, paths, strict=True):
-        ds, seconds = _run_one(study, path, workers, fresh)
-        lost = failures(ds)
+        seconds = _make(study, path, workers, fresh)
+        with xr.open_dataset(path, engine="netcdf4") as ds:
+            lost = failures(ds)
+            _tell(study, ds, lost)
+            if figures:
+                draw(ds.load(), path)
         failed = failed or bool(lost)
         rows.append(
             (study.name, str(len(study.cases)), str(len(lost)), f"{seconds:.1f} s" if seconds else "there already", str(path))
         )
-        _tell(study, ds, lost)
-        if figures:
-            draw(ds, path)
     _sum_up(rows)
     raise typer.Exit(SOME_FAILED if failed else DONE)
 
@@ -85,6 +94,11 @@ def _check_paths(paths: list[Path], sources: list[str]) -> None:
     places = [path.resolve() for path in paths]
     read = {Path(source).resolve() for source in sources}
     wrong += [f"{path}: is a study file, results would overwrite it" for path in paths if path.resolve() in read]
+    wrong += [
+        f"{folder}: is a file, must be a folder for the batches of {path.name}"
+        for path in paths
+        if (folder := Store.beside(path).folder).exists() and not folder.is_dir()
+    ]
     twice = dict.fromkeys(path for path, place in zip(paths, places, strict=True) if places.count(place) > 1)
     wrong += [f"{path}: two of the studies would write it; run one with --out" for path in twice]
     for folder in dict.fromkeys(path.parent for path in paths):
@@ -97,44 +111,93 @@ def _check_paths(paths: list[Path], sources: list[str]) -> None:
         raise refuse(wrong)
 
 
-def _run_one(study: Study, path: Path, workers: int | None, fresh: bool) -> tuple[xr.Dataset, float]:
-    """The dataset and the seconds it took, zero where the file was there already."""
-    if not fresh and path.is_file() and (ds := _finished(study, path)) is not None:
-        return ds, 0.0
+def _make(study: Study, path: Path, workers: int | None, fresh: bool) -> float:
+    """The seconds it took to make the results file, zero where it was there already."""
+    if not fresh and _is_finished(study, path):
+        return 0.0
     start = time.perf_counter()
-    total = study.case_steps
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with Progress(*columns, console=console.err) as bar:
-        task = bar.add_task(study.name, total=total)
+    runs: list[Run] = []
+    with Progress(*columns, console=console.err) as bar, _stopped_by_sigterm():
+        task = bar.add_task(study.name, total=study.case_steps)
+
+        def watch(begun: Run) -> Callable[[int], None]:
+            runs.append(begun)
+            bar.advance(task, study.case_steps - begun.steps_left)
+            if begun.n_there:
+                bar.console.print(
+                    f"{study.name}: {begun.n_there} of {in_batches(len(begun.entries))} there already", markup=False
+                )
+            return partial(bar.advance, task)
+
         try:
-            ds = run_study(study, workers, lambda steps: bar.advance(task, steps))
+            run_into(path, study, workers, watch, fresh)
         except StudyError as error:
             bar.stop()
             raise refuse(error.mistakes) from None
         except KeyboardInterrupt:
             bar.stop()
-            console.err.print(f"Stopped; {path} was not written.")
+            console.err.print(f"Stopped; {path} was not written. {_kept(runs)}", markup=False, soft_wrap=True)
             raise typer.Exit(INTERRUPTED) from None
-        bar.update(task, completed=total)
-    try:
-        write_dataset(ds, path)
-    except OSError as error:
-        raise refuse([f"{path}: cannot be written: {error.strerror or error}"]) from None
-    return ds, time.perf_counter() - start
+        except OSError as error:
+            bar.stop()
+            raise refuse([f"{_place(error, path)}: cannot be written: {_why(error)} {_kept(runs)}"]) from None
+    return time.perf_counter() - start
 
 
-def _finished(study: Study, path: Path) -> xr.Dataset | None:
-    """The dataset of this very study, where the file holds it."""
+def in_batches(n: int) -> str:
+    """'1 batch was', '20 batches were'."""
+    return "1 batch was" if n == 1 else f"{n} batches were"
+
+
+def _kept(runs: list[Run]) -> str:
+    """What is not lost."""
+    if not runs:
+        return "Nothing was computed."
+    (run,) = runs
+    return f"{run.n_done} of {len(run.entries)} batches are in {run.store.folder}; the same command goes on from there."
+
+
+def _place(error: OSError, path: Path) -> Path:
+    """What could not be written: the results file or the folder of its batches."""
+    folder = Store.beside(path).folder
+    return folder if error.filename and folder in (Path(error.filename), *Path(error.filename).parents) else path
+
+
+def _why(error: OSError) -> str:
+    """As a sentence."""
+    why = error.strerror or str(error)
+    return why if why.endswith("?") else f"{why}."
+
+
+@contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """SIGTERM, as of a computer that shuts down, stops the run as Ctrl-C does."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
     try:
-        ds = xr.load_dataset(path, engine="netcdf4")
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _is_finished(study: Study, path: Path) -> bool:
+    """Whether the file holds this very study with no case left that deserves another try."""
+    if not path.is_file():
+        return False
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as ds:
+            return ds.attrs.get("study_hash") == study_hash(study) and not (ds["status"] == Status.WORKER_LOST).any()
     except (OSError, ValueError):
-        return None
-    return ds if ds.attrs.get("study_hash") == study_hash(study) else None
+        return False
 
 
 def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:

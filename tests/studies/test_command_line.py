@@ -13,7 +13,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from engine.spec import Layer, Spec
-from studies import load_study, run_study, runner, sentences, shipped_studies, table, write_dataset
+from studies import batch, load_study, run_study, runner, sentences, shipped_studies, table, write_dataset
 from studies.__main__ import app
 from studies.commands import running
 from studies.show import TRACE_HEAD, show_lines
@@ -60,7 +60,9 @@ def flat(text):
 
 
 def files(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+    """All files but those of the batches."""
+    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return sorted(str(path) for path in found if path.parent.suffix != ".batches")
 
 
 def refused(outcome, *lines):
@@ -103,7 +105,7 @@ def test_nothing_is_said_where_all_cases_are_solved(quick_toml):
 def test_run_again_computes_nothing(quick_toml, folder, monkeypatch):
     call("run", quick_toml, "--workers", 1)
     before = (folder / "results/quick.nc").stat().st_mtime_ns
-    monkeypatch.setattr(running, "run_study", lambda *a, **k: pytest.fail("it ran"))
+    monkeypatch.setattr(running, "run_into", lambda *a, **k: pytest.fail("it ran"))
     outcome = call("run", quick_toml)
     assert outcome.exit_code == 0
     assert "there already" in flat(outcome.stdout)
@@ -187,42 +189,36 @@ def test_a_study_of_which_nothing_can_be_built_is_told_in_one_line(quick_toml, f
     def too_large(spec):
         raise MemoryError("no room for the mesh")
 
-    monkeypatch.setattr(runner, "build_model", too_large)
+    monkeypatch.setattr(batch, "build_model", too_large)
     outcome = call("run", quick_toml, "--workers", 1)
     assert outcome.exit_code in (1, 2)
     assert "no room for the mesh" in flat(outcome.stdout + outcome.stderr)
     assert "Traceback" not in outcome.stderr
 
 
-def test_an_interrupted_run_writes_nothing(quick_toml, folder, monkeypatch):
+def interrupting(monkeypatch):
+    """Interrupts the run in its first batch."""
+
     def interrupted(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(running, "run_study", interrupted)
+    monkeypatch.setattr(runner, "carry_out", interrupted)
+
+
+def test_an_interrupted_run_says_what_is_kept(quick_toml, folder, monkeypatch):
+    interrupting(monkeypatch)
     outcome = call("run", quick_toml, "--out", "x.nc")
     assert outcome.exit_code == 130
-    assert "Stopped; x.nc was not written." in flat(outcome.stderr)
+    said = "Stopped; x.nc was not written. 0 of 1 batches are in x.batches; the same command goes on from there."
+    assert said in outcome.stderr.splitlines()
     assert files(folder) == ["quick.toml"]
 
 
 def test_an_interrupted_run_leaves_the_file_of_before(quick_toml, results, monkeypatch):
-    def interrupted(*arguments):
-        raise KeyboardInterrupt
-
     before = results.read_bytes()
-    monkeypatch.setattr(running, "run_study", interrupted)
+    interrupting(monkeypatch)
     assert call("run", quick_toml, "--out", results, "--fresh").exit_code == 130
     assert results.read_bytes() == before
-
-
-def test_a_disk_that_is_full_is_told_in_one_line(quick_toml, folder, monkeypatch):
-    def full(ds, path):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(running, "write_dataset", full)
-    outcome = call("run", quick_toml, "--out", "x.nc", "--workers", 1)
-    assert outcome.exit_code == 2
-    assert "x.nc: cannot be written: No space left on device" in outcome.stderr.splitlines()
 
 
 # refusals ------------------------------------------------------------------------------------------------------------------
@@ -354,7 +350,7 @@ def test_a_netcdf_file_of_others_is_told_in_one_line(command, folder):
 
 
 def test_check_says_what_would_run_and_runs_nothing(quick_toml, folder, monkeypatch):
-    monkeypatch.setattr(running, "run_study", lambda *a, **k: pytest.fail("it ran"))
+    monkeypatch.setattr(running, "run_into", lambda *a, **k: pytest.fail("it ran"))
     outcome = call("check", quick_toml)
     assert outcome.exit_code == 0
     assert files(folder) == ["quick.toml"]

@@ -1,21 +1,16 @@
 """The runner: the same bits whatever the number of processes, whole files or none, progress that adds up."""
 
-import multiprocessing
 import os
-import pickle
-from concurrent.futures import ThreadPoolExecutor
-from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import studies
-from engine import LANES, Status
-from studies import run_study, runner, write_dataset
-from studies.plan import Batch, shared
-from studies.runner import JOBS_A_WORKER, ONE_THREAD, Job, Lost, Outcome, run_batch, trace_case
+from engine import Status
+from studies import batch, run_study, runner, write_dataset
+from studies.batch import Job, run_batch, trace_case
+from studies.plan import Batch
 
 from .conftest import FAILING, QUICK, SHORT, study_of
 
@@ -47,99 +42,66 @@ def test_two_processes_give_the_bits_of_one():
 def test_kernels_are_compiled_before_processes_start(monkeypatch):
     done = []
 
-    def in_pool(study, batches, workers):
-        done.append("pool")
-        return ((i, runner._guarded(Job.of(study, study.batches[i]))) for i in list(batches))
+    class Crew(runner.Crew):
+        def __init__(self, *arguments):
+            done.append("crew")
+            super().__init__(*arguments)
 
     monkeypatch.setattr(runner, "compile_kernels", lambda: done.append("compiled"))
-    monkeypatch.setattr(runner, "_in_pool", in_pool)
+    monkeypatch.setattr(runner, "Crew", Crew)
     run_study(study_of(TWO_BATCHES), workers=2)
-    assert done == ["compiled", "pool"]
+    assert done == ["compiled", "crew"]
 
-
-# models and jobs --------------------------------------------------------------------------------------------------------------
-
-
-MANY = f"{SHORT}[sweep]\np0 = {{ from = 0, to = '4 MPa', num = {LANES + 1} }}\ndamping_ratio = [0.02, 0.05]\n"
-"""Two models, each with two batches."""
 
 NINE = f"{SHORT}[sweep]\ndamping_ratio = {{ from = 0.01, to = 0.05, num = 9 }}\n"
 
 
-class Threads(ThreadPoolExecutor):
-    """Threads of this process in place of others."""
-
-    def __init__(self, workers, mp_context, initializer):
-        super().__init__(workers)
-
-
-def empty_outcome(spec):
-    """An outcome without arrays, of a model that has a spec and nothing else."""
-    return Outcome(SimpleNamespace(spec=spec), {})
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_no_more_jobs_are_made_than_keep_all_workers_busy(monkeypatch, workers):
+def test_one_job_is_made_ahead(monkeypatch):
     """A job holds its motions: those of a long study would not fit beside each other."""
-    study, made = study_of(NINE), []
-    assert len(study.batches) == 9
+    made, given, most = [], [], []
 
-    def of(study, batch):
-        made.append(batch)
-        return batch
+    class Job(runner.Job):
+        @classmethod
+        def of(cls, study, batch):
+            made.append(batch)
+            return runner.Ended((0,) * len(batch.cases), ("",) * len(batch.cases))
 
-    monkeypatch.setattr(runner, "ProcessPoolExecutor", Threads)
-    monkeypatch.setattr(runner.Job, "of", of)
-    monkeypatch.setattr(runner, "_guarded", lambda batch: batch)
-    most, given = JOBS_A_WORKER * workers, []
-    for i, outcome in runner._in_pool(study, list(range(9)), workers):
-        assert outcome is study.batches[i]
-        assert len(made) - len(given) <= most
-        assert len(made) >= min(most, 9)
-        given.append(i)
-    assert sorted(given) == list(range(9))
+    class Crew:
+        """Two that answer in turn."""
+
+        def __init__(self, size, function):
+            self.tasks = []
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        @property
+        def free(self):
+            return len(self.tasks) < 2
+
+        @property
+        def busy(self):
+            return bool(self.tasks)
+
+        def give(self, piece, task):
+            self.tasks.append((piece, task.job))
+
+        def answers(self, tell):
+            most.append(len(made) - len(given))
+            given.append(self.tasks[0])
+            yield self.tasks.pop(0)
+
+    monkeypatch.setattr(runner, "Job", Job)
+    monkeypatch.setattr(runner, "Crew", Crew)
+    study = study_of(NINE)
+    with pytest.raises(OSError, match=r"npz"):  # nothing was computed
+        run_study(study, workers=2)
     assert made == list(study.batches)
-
-
-def test_no_batch_is_left_by_a_pool_that_loses_no_worker(monkeypatch):
-    """Each of nine is an outcome of the pool; one by one are only those that a lost worker has left."""
-    study, one_by_one = study_of(NINE), []
-    monkeypatch.setattr(runner, "ProcessPoolExecutor", Threads)
-    monkeypatch.setattr(runner, "_guarded", lambda job: empty_outcome(job.specs[0]))
-
-    def alone(study, i):
-        one_by_one.append(i)
-        return empty_outcome(study.cases[i])
-
-    monkeypatch.setattr(runner, "_alone", alone)
-    given = [i for i, _ in runner._outcomes(study, 2, lambda steps: None)]
-    assert sorted(given) == list(range(9))
-    assert one_by_one == []
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_outcomes_that_share_a_model_hold_one_object(monkeypatch, workers):
-    """Also where each comes with a copy, as from another process."""
-    study = study_of(MANY)
-    common = [shared(study.cases[batch.cases[0]]) for batch in study.batches]
-    assert len(common) == 4
-    assert len(set(common)) == 2
-
-    def in_pool(study, batches, workers):
-        for i in list(batches):
-            yield i, pickle.loads(pickle.dumps(empty_outcome(study.cases[study.batches[i].cases[0]])))
-
-    if workers > 1:
-        monkeypatch.setattr(runner, "_in_pool", in_pool)
-    models = {i: outcome.model for i, outcome in runner._outcomes(study, workers, lambda steps: None)}
-    for i, j in product(range(4), repeat=2):
-        assert (models[i] is models[j]) == (common[i] == common[j])
-
-
-def test_a_lost_batch_has_no_model_to_share():
-    lost, models = Lost(Status.NOT_RUN, "no room"), {}
-    assert runner._with_one_model(models, lost) is lost
-    assert models == {}
+    assert len(given) == 9
+    assert max(most) == 3
 
 
 def test_a_second_run_gives_the_same_bits(quick, quick_ds):
@@ -149,7 +111,7 @@ def test_a_second_run_gives_the_same_bits(quick, quick_ds):
 @pytest.mark.parametrize("case", range(4))
 def test_a_case_alone_gives_the_bits_of_the_case_in_company(case, quick, quick_ds):
     outcome = run_batch(Job.of(quick, Batch((case,))))
-    for name, values in outcome.arrays.items():
+    for name, values in outcome.cases.items():
         if name in quick_ds and values.dtype.kind in "fi" and name != "time":
             here = quick_ds[name].isel(p0=case) if "p0" in quick_ds[name].dims else quick_ds[name]
             np.testing.assert_array_equal(values[0], here.values, err_msg=name)
@@ -170,11 +132,6 @@ def test_progress_counts_a_batch_to_its_end_where_all_its_cases_fail():
     ds = run_study(study, workers=1, progress=told.append)
     assert int(ds["status"]) == 4
     assert sum(told) == 40
-
-
-def test_processes_are_started_with_one_thread_each():
-    assert set(ONE_THREAD) == {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"}
-    assert set(ONE_THREAD.values()) == {"1"}
 
 
 def test_run_takes_a_path(tmp_path, quick_ds):
@@ -244,14 +201,14 @@ def test_trace_knows_the_case_s_own_model():
 
 def test_a_batch_that_cannot_be_built_does_not_stop_the_others(monkeypatch):
     """Failed cases are NaN with status and reason; they never stop a study (DESIGN section 5)."""
-    built = runner.build_model
+    built = batch.build_model
 
     def too_large(spec):
         if spec.damping.ratio == 0.05:
             raise MemoryError("no room for the mesh")
         return built(spec)
 
-    monkeypatch.setattr(runner, "build_model", too_large)
+    monkeypatch.setattr(batch, "build_model", too_large)
     ds = run_study(study_of(TWO_BATCHES), workers=1)
     assert (ds["status"].sel(damping_ratio=0.02) == Status.DONE).all()
     assert (ds["status"].sel(damping_ratio=0.05) >= Status.NOT_CONVERGED).all()
@@ -262,25 +219,6 @@ def test_a_batch_that_cannot_be_built_does_not_stop_the_others(monkeypatch):
     assert (lost["joint_state"] == -1).all()
     assert ds["axial_force"].dtype == ds["joint_pressure"].dtype == np.float32
     assert all("no room for the mesh" in str(reason) for reason in ds["reason"].sel(damping_ratio=0.05).values)
-
-
-def test_killed_workers_lose_their_own_cases_at_most():
-    """Batches of killed workers are computed anew, or say that they were lost (DESIGN section 5, status 6)."""
-    killed = []
-
-    def kill_all(steps):
-        if not killed:
-            killed.extend(multiprocessing.active_children())
-            for worker in killed:
-                worker.kill()
-
-    text = f"{SHORT.replace('0.4 s', '4 s')}[sweep]\ndamping_ratio = [0.01, 0.02, 0.05]\n"
-    ds = run_study(study_of(text), workers=2, progress=kill_all)
-    assert len(killed) == 2
-    lost = ds["status"] == Status.WORKER_LOST
-    assert ((ds["status"] == Status.DONE) | lost).all()
-    assert not lost.all()
-    assert np.isnan(ds["peak_racking"].values[lost.values]).all()
 
 
 # files ---------------------------------------------------------------------------------------------------------------------

@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 
 from engine import Status
-from studies import run_study, runner
+from studies import batch, run_study
+from studies.batch import Job, run_batch
 from studies.plan import Batch
-from studies.runner import Job, run_batch
 from studies.scaling import SAME
 from studies.schema import SCHEMA
 
@@ -125,7 +125,7 @@ def test_the_sentence_counts_and_is_silent_where_all_are_solved():
 
 def one_by_one(study):
     """The arrays of each case marched by itself."""
-    return [run_batch(Job.of(study, Batch((case,)))).arrays for case in range(len(study.cases))]
+    return [run_batch(Job.of(study, Batch((case,)))).cases for case in range(len(study.cases))]
 
 
 def assert_like_one_by_one(study, ds, exact):
@@ -200,16 +200,16 @@ def test_a_failed_case_fails_with_all_that_follow_from_it():
 
 def test_a_lost_batch_loses_its_followers_and_says_what_they_were(monkeypatch):
     study = study_of(f'{LIGHT}[sweep]\np0 = ["1 MPa", "2 MPa"]\nscale = [1, 2]\ndamping_ratio = [0.02, 0.05]')
-    built = runner.build_model
+    built = batch.build_model
 
     def too_large(spec):
         if spec.damping.ratio == 0.05:
             raise MemoryError("no room for the mesh")
         return built(spec)
 
-    monkeypatch.setattr(runner, "build_model", too_large)
+    monkeypatch.setattr(batch, "build_model", too_large)
     ds = run_study(study, workers=1)
-    assert (ds["status"].sel(damping_ratio=0.05) == Status.NOT_RUN).all()
+    assert (ds["status"].sel(damping_ratio=0.05) == Status.WORKER_LOST).all()
     assert (ds["status"].sel(damping_ratio=0.02) == Status.DONE).all()
     assert ds["solved_as"].sel(damping_ratio=0.05).values.tolist() == [[2, 4], [6, 2]]
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from engine import Status, Trace, build_model
 from studies import run_study, write_dataset
-from studies.runner import trace_case
+from studies.batch import trace_case
 from studies.schema import COORDINATES, SCHEMA
 from studies.show import TRACE_HEAD, show_lines, trace_line
 
