@@ -38,7 +38,7 @@ def _in_words(exit_code: int) -> str:
     """How a process ended."""
     if exit_code >= 0:
         return f"ended with exit code {exit_code}"
-    name = signal.Signals(-exit_code).name
+    name = next((known.name for known in signal.Signals if known == -exit_code), f"signal {-exit_code}")
     return f"was killed ({name}{', as the system does where memory runs out' if name == 'SIGKILL' else ''})"
 
 

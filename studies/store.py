@@ -107,12 +107,22 @@ def write_batch(path: Path, status: Sequence[int], reason: Sequence[str], cases:
 
 @contextmanager
 def opened(path: Path) -> Iterator[tuple[Header, Mapping[str, np.ndarray]]]:
-    """Header of a batch file and its arrays, each read and checked when it is asked for; OSError where the file is torn."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            yield Header(**json.loads(file["header"].tobytes())), file
-    except (ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
-        raise OSError(f"{path.name}: is damaged ({error}); the same command again computes it anew") from None
+    """Header of a batch file and its arrays, each read and checked when it is asked for; OSError where the file is damaged."""
+    with path.open("rb") as raw:
+        try:
+            file = np.load(raw, allow_pickle=False)
+            header = Header(**json.loads(file["header"].tobytes()))
+        except (ValueError, LookupError, TypeError, EOFError, RuntimeError, BadZipFile) as error:
+            raise _damaged(path, error) from None
+        with file:
+            try:
+                yield header, file
+            except BadZipFile as error:
+                raise _damaged(path, error) from None
+
+
+def _damaged(path: Path, error: Exception) -> OSError:
+    return OSError(None, f"{path.name} is damaged ({error})", str(path))
 
 
 def verified(path: Path) -> bool:
