@@ -42,6 +42,7 @@ def _flush_folder(folder: Path) -> None:
 
 
 def clear_parts(folder: Path, name: str = "*") -> None:
-    """Remove what a killed process has left of files of this name that it was writing; nobody else may be writing them."""
+    """Remove what an ended process has left of files of this name that it was writing; nobody may be writing them."""
     for part in folder.glob(f"{name}.*{PART}"):
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # another program reads it; it does no harm
+            part.unlink(missing_ok=True)

@@ -1,5 +1,6 @@
 """Executes the batches of a study that are not on disk yet, one process a core, and merges them to one dataset."""
 
+import errno
 import os
 import time
 from collections import Counter, deque
@@ -81,7 +82,7 @@ def _written(path: Path) -> Iterator[Path]:
         with whole(path) as part:
             yield part
     except RuntimeError as error:
-        raise OSError(None, f"{error}; is the disk full?", str(path)) from None
+        raise OSError(errno.EIO, f"{error}; is the disk full?", str(path)) from None
 
 
 def _add_convergence(path: Path, sizes: DomainSizes) -> None:

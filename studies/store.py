@@ -152,18 +152,28 @@ class Store:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Held while a run is at it; the operating system lets go when the process ends, however it ends."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(self.folder / "lock")
+        """Held while a run is at it; the operating system lets go when the process ends, however it ends.
+
+        StudyError where another one holds it; OSError where the folder cannot be written to.
+        """
+        place = self.folder / "lock"
+        lock = FileLock(place)
         try:
-            with lock.acquire(timeout=0):
-                clear_parts(self.folder)
-                self._read_journal()
-                yield
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock.acquire(timeout=0)
         except Timeout:
             raise StudyError(
                 [f"{self.folder}: another run is writing here; let it end, or name another file with --out"]
             ) from None
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(place)) from None
+        try:
+            clear_parts(self.folder)
+            self._read_journal()
+            yield
+        finally:
+            clear_parts(self.folder)
+            lock.release()
 
     def path(self, name: str) -> Path:
         """The file of a batch."""

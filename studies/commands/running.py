@@ -123,30 +123,26 @@ def _make(study: Study, path: Path, workers: int | None, fresh: bool) -> float:
         TimeRemainingColumn(elapsed_when_finished=True),
     )
     runs: list[Run] = []
-    with Progress(*columns, console=console.err) as bar, _stopped_by_sigterm():
-        task = bar.add_task(study.name, total=study.case_steps)
+    try:
+        with Progress(*columns, console=console.err) as bar, _stopped_by_sigterm():
+            task = bar.add_task(study.name, total=study.case_steps)
 
-        def watch(begun: Run) -> Callable[[int], None]:
-            runs.append(begun)
-            bar.advance(task, study.case_steps - begun.steps_left)
-            if begun.n_there:
-                bar.console.print(
-                    f"{study.name}: {begun.n_there} of {in_batches(len(begun.entries))} there already", markup=False
-                )
-            return partial(bar.advance, task)
+            def watch(begun: Run) -> Callable[[int], None]:
+                runs.append(begun)
+                bar.advance(task, study.case_steps - begun.steps_left)
+                if begun.n_there:
+                    there = f"{begun.n_there} of {in_batches(len(begun.entries))} there already"
+                    bar.console.print(f"{study.name}: {there}", markup=False)
+                return partial(bar.advance, task)
 
-        try:
             run_into(path, study, workers, watch, fresh)
-        except StudyError as error:
-            bar.stop()
-            raise refuse(error.mistakes) from None
-        except KeyboardInterrupt:
-            bar.stop()
-            console.err.print(f"Stopped; {path} was not written. {_kept(runs)}", markup=False, soft_wrap=True)
-            raise typer.Exit(INTERRUPTED) from None
-        except OSError as error:
-            bar.stop()
-            raise refuse([f"{_place(error, path)}: cannot be written: {_why(error)} {_kept(runs)}"]) from None
+    except StudyError as error:
+        raise refuse(error.mistakes) from None
+    except KeyboardInterrupt:
+        console.err.print(f"Stopped; {path} was not written. {_kept(runs)}", markup=False, soft_wrap=True)
+        raise typer.Exit(INTERRUPTED) from None
+    except OSError as error:
+        raise refuse([f"{_place(error, path)}: {_why(error)} {_kept(runs)}"]) from None
     return time.perf_counter() - start
 
 
@@ -170,9 +166,10 @@ def _place(error: OSError, path: Path) -> Path:
 
 
 def _why(error: OSError) -> str:
-    """As a sentence."""
+    """As a sentence; what has no number is no fault of the file system."""
     why = error.strerror or str(error)
-    return why if why.endswith("?") else f"{why}."
+    said = f"cannot be written: {why}" if error.errno else why
+    return said if said.endswith("?") else f"{said}."
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from studies import pool
-from studies.pool import ONE_THREAD, Broken, Crew, StartError
+from studies.pool import ONE_THREAD, Broken, Crew
 
 
 def doubled(task, progress):
