@@ -8,8 +8,12 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import xarray as xr
+
 from engine import Status, compile_kernels
-from studies import Study, make_study, run_study, write_dataset
+from studies import Study, make_study
+from studies.batch import Progress
+from studies.runner import Run, run_into
 
 from . import bench
 from .process import ROOT, peak_gib, peak_of_children_gib
@@ -25,7 +29,8 @@ GOALS = {"seconds": 300, "gib": 2}
 class Large:
     """What the study took.
 
-    seconds_reading, seconds_computing, seconds_writing : wall time, with every kernel compiled before
+    seconds_reading, seconds_computing, seconds_writing : wall time, with every kernel compiled before; batches are written while
+    others are computed, so that writing is their merging to one file
     parent_gib, child_gib : largest resident memory of the process that asked and of any worker
     file_mib : size of the dataset; statuses : number of cases by how they ended
     """
@@ -74,16 +79,25 @@ def study_of(frictions: int = FRICTIONS) -> Study:
 
 
 def measured(frictions: int) -> Large:
-    """Run the study and write its dataset."""
+    """Run the study anew into its results file; all after the last step is merging and writing."""
     compile_kernels()
     began = time.perf_counter()
     study = study_of(frictions)
     solved = len(study.scaling.solved)
     read = time.perf_counter()
-    ds = run_study(study, WORKERS)
-    computed = time.perf_counter()
-    write_dataset(ds, RESULT)
+    computed = read
+
+    def watch(run: Run) -> Progress:
+        def tell(steps: int) -> None:
+            nonlocal computed
+            computed = time.perf_counter()
+
+        return tell
+
+    run_into(RESULT, study, WORKERS, watch, fresh=True)
     written = time.perf_counter()
+    with xr.open_dataset(RESULT, engine="netcdf4") as ds:
+        statuses = by_status(ds["status"].values.ravel().tolist())
     return Large(
         cases=len(study.cases),
         solved=solved,
@@ -95,7 +109,7 @@ def measured(frictions: int) -> Large:
         parent_gib=peak_gib(),
         child_gib=peak_of_children_gib(),
         file_mib=RESULT.stat().st_size / 2**20,
-        statuses=by_status(ds.status.values.ravel().tolist()),
+        statuses=statuses,
     )
 
 

@@ -1,9 +1,11 @@
-"""The command line: run, check, plot, show, table, list, schema.
+"""The command line: run, check, plot, show, rerun, table, list, schema.
 
 Each command imports what it needs when it is called: numba, scipy and xarray take a second, for which help need not wait.
 """
 
+import errno
 import gc
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -29,7 +31,16 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     gc.disable()  # until the imports of the command are done
-    app()
+    try:
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left to say has nowhere to go
+        if error.errno != errno.EPIPE:  # else the reader has seen enough
+            print(f"output: cannot be written: {error.strerror}", file=sys.stderr)
+        sys.exit(2)
 
 
 def _commands(name: str) -> Any:
@@ -81,6 +92,12 @@ def plot(results: ResultFile) -> None:
 def show(results: ResultFile) -> None:
     """Say what a results file is: study, provenance, axes, how the cases ended, every variable with unit and meaning."""
     _commands("reading").show(results)
+
+
+@app.command()
+def rerun(results: ResultFile, workers: Workers = None) -> None:
+    """Repeat the study of a results file and say whether the results are the same."""
+    _commands("running").rerun(results, workers)
 
 
 @app.command()

@@ -12,7 +12,7 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from engine import PERIODS, Spec, Status
+from engine import PERIODS, GroundMotion, Spec, Status
 from engine.recorder import STRESSES
 
 from .axes import Along
@@ -67,7 +67,28 @@ def write_dataset_of(study: Study, parts: Sequence[Part], path: Path) -> None:
         merge.fill({name: merge.created(file, name) for name in merge.by_case})
     encoding = {name: COMPRESSED for name, v in merge.rest.data_vars.items() if v.ndim and v.dtype.kind in "fi"}
     merge.rest.to_netcdf(path, mode="a", engine="netcdf4", encoding=encoding)
+    with netCDF4.Dataset(path, "a") as file:
+        _write_records(file.createGroup(RECORDS), study.motions)
 
+
+def _write_records(group: netCDF4.Group, motions: Mapping[str, GroundMotion]) -> None:
+    """The records as they were read, so that the study can be repeated from its results alone."""
+    for i, (name, motion) in enumerate(motions.items(), start=1):
+        group.createDimension(f"sample_{i}", len(motion.acceleration))
+        written = group.createVariable(f"record_{i}", "f8", (f"sample_{i}",), **COMPRESSED)
+        written.setncatts({"units": "m/s2", "long_name": "acceleration of the record", "record": name, "dt": motion.dt})
+        written[:] = motion.acceleration
+
+
+def read_records(path: Path) -> dict[str, GroundMotion]:
+    """The records that a results file holds, by the names that its study gives them."""
+    with netCDF4.Dataset(path) as file:
+        found = file.groups[RECORDS].variables.values() if RECORDS in file.groups else ()
+        return {v.record: GroundMotion(Path(v.record).name, float(v.dt), np.array(v[:])) for v in found}
+
+
+RECORDS = "records"
+"""Group of a results file that holds the records; xarray and viewers pass over it."""
 
 COMPRESSED: dict[str, Any] = {"zlib": True, "complevel": 1}
 

@@ -183,8 +183,18 @@ def _read(path: Path) -> str:
         raise StudyError([f"{path.name}: cannot be read: {error.strerror}"]) from None
 
 
-def make_study(table: dict[str, Any], name: str = "study", text: str = "", folder: Path | None = None, file: str = "") -> Study:
-    """The study that a table describes, as read from TOML; StudyError with one line for every mistake, led by `file`."""
+def make_study(
+    table: dict[str, Any],
+    name: str = "study",
+    text: str = "",
+    folder: Path | None = None,
+    file: str = "",
+    records: Mapping[str, GroundMotion] | None = None,
+) -> Study:
+    """The study that a table describes, as read from TOML; StudyError with one line for every mistake, led by `file`.
+
+    folder : where records are sought before those shipped; `records` by these names are taken as they are
+    """
     mistakes: list[str] = []
     title = table.get("title", name)
     if not isinstance(title, str):
@@ -200,7 +210,7 @@ def make_study(table: dict[str, Any], name: str = "study", text: str = "", folde
         sizes = None
     axes = [domain_axis(sizes, base or Spec())] if sizes else swept_axes(table.get("sweep", {}), mistakes)
     cases = _cases(base or Spec(), axes, mistakes, only_values=base is None)
-    motions = _motions(_records(table, base, cases), folder or Path(), mistakes)
+    motions = _motions(_records(table, base, cases), folder or Path(), records or {}, mistakes)
     if mistakes:
         lead = f"{file or name}: "
         raise StudyError([lead + line for line in dict.fromkeys(mistakes)])
@@ -309,10 +319,15 @@ def _records(table: dict[str, Any], base: Spec | None, cases: list[Spec]) -> dic
     return named
 
 
-def _motions(records: dict[str, tuple[str, set[Said]]], folder: Path, mistakes: list[str]) -> dict[str, GroundMotion]:
+def _motions(
+    records: dict[str, tuple[str, set[Said]]], folder: Path, known: Mapping[str, GroundMotion], mistakes: list[str]
+) -> dict[str, GroundMotion]:
     """The records by name, each read once: sought beside the study, then among those shipped."""
     motions: dict[str, GroundMotion] = {}
     for name, (field, said) in records.items():
+        if name in known:
+            motions[name] = known[name]
+            continue
         path = next((root / name for root in (folder, MOTIONS, SHIPPED) if _safely((root / name).is_file)), None)
         try:
             if path is None:

@@ -3,31 +3,60 @@
 import platform
 import subprocess
 from datetime import UTC, datetime
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 
+from llvmlite.binding import get_host_cpu_name
+
+from engine import LANES
+
 from .plan import Study
+
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite")
+"""Those whose versions decide bits."""
+
+MAKERS = ("arrays.py", "batch.py", "scaling.py", "schema.py", "uplift.py")
+"""Sources here that decide the content of a batch file, beside the engine's."""
+
+
+@cache
+def machine() -> str:
+    """Digest of what computes: the engine's sources, the packages that decide bits, the processor. Equal ones give equal bits."""
+    here = Path(__file__).parent
+    digest = sha256()
+    for source in [*sorted((here.parent / "engine").rglob("*.py")), *(here / name for name in MAKERS)]:
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    versions = " ".join(f"{package} {version(package)}" for package in PACKAGES)
+    digest.update(f"{versions} {LANES} {platform.system()} {platform.machine()} {get_host_cpu_name()}".encode())
+    return digest.hexdigest()
 
 
 def provenance(study: Study) -> dict[str, str]:
     packages = ("coralquake", "numpy", "numba", "scipy", "xarray", "netCDF4", "pandas")
     said = f"; {study.scaling.sentence}" if study.scaling.sentence else ""
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    records = ", ".join(f"{name} {sha256(m.acceleration.tobytes()).hexdigest()}" for name, m in study.motions.items())
     return {
         "Conventions": "CF-1.11 UGRID-1.0",
         "title": study.title,
         "study_name": study.name,
         "study": study.text,
         "study_hash": study_hash(study),
-        "records_sha256": records or "none",
+        "records_sha256": records_sha256(study),
         "package_versions": ", ".join(f"{package} {version(package)}" for package in packages),
         "commit": _commit(),
         "platform": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+        "processor": get_host_cpu_name(),
+        "machine_hash": machine(),
         "created": now,
         "history": f"{now} computed by coralquake {version('coralquake')}{said}",
     }
+
+
+def records_sha256(study: Study) -> str:
+    """Names of the records with digests of their values."""
+    return ", ".join(f"{name} {sha256(m.acceleration.tobytes()).hexdigest()}" for name, m in study.motions.items()) or "none"
 
 
 def _commit() -> str:

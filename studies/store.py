@@ -1,15 +1,12 @@
 """The batches of a study on disk: a file each, named by what decides its content, with a journal and a manifest beside them."""
 
 import json
-import platform
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from itertools import chain, count
 from pathlib import Path
 from typing import Any, Self
@@ -17,34 +14,16 @@ from zipfile import BadZipFile
 
 import numpy as np
 from filelock import FileLock, Timeout
-from llvmlite.binding import get_host_cpu_name
 
-from engine import LANES, Spec, Status
+from engine import Spec, Status
 
 from .files import clear_parts, whole
 from .messages import StudyError
 from .plan import Batch, Study
-
-PACKAGES = ("numpy", "scipy", "numba", "llvmlite")
-"""Those whose versions decide bits."""
-
-MAKERS = ("arrays.py", "batch.py", "scaling.py", "schema.py", "uplift.py")
-"""Sources here that decide the content of a batch file, beside the engine's."""
+from .provenance import machine
 
 AFTER_THE_FIRST = 2
 """Of a file that is set aside for the second time and later, the number behind its name."""
-
-
-@cache
-def machine() -> str:
-    """What computes: the engine's sources, the packages that decide bits, the processor."""
-    here = Path(__file__).parent
-    digest = sha256()
-    for source in [*sorted((here.parent / "engine").rglob("*.py")), *(here / name for name in MAKERS)]:
-        digest.update(source.name.encode() + b"\0" + source.read_bytes())
-    versions = " ".join(f"{package} {version(package)}" for package in PACKAGES)
-    digest.update(f"{versions} {LANES} {platform.system()} {platform.machine()} {get_host_cpu_name()}".encode())
-    return digest.hexdigest()
 
 
 class Names:

@@ -1,5 +1,6 @@
 """plot, show, table: what a results file holds."""
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import xarray as xr
@@ -7,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ..files import whole
 from ..show import show_lines
 from ..tables import axes_of, table
 from . import console
@@ -16,16 +18,24 @@ WIDEST_COLUMN = 30
 """Characters that a column of results may need; the table is as wide as its content, narrower terminals wrap its lines."""
 
 
-def _open(path: Path) -> xr.Dataset:
+def opened_results(path: Path) -> xr.Dataset:
+    """The dataset of a results file, read as it is needed; what is none is refused."""
     if not path.is_file():
         raise refuse([f"{path}: there is no such results file; results are written by `coralquake run`"])
     try:
-        ds = xr.load_dataset(path, engine="netcdf4")
+        ds = xr.open_dataset(path, engine="netcdf4")
     except (OSError, ValueError):
         raise refuse([f"{path}: is not a netCDF file that can be read"]) from None
     if "study_hash" not in ds.attrs or "status" not in ds:
+        ds.close()
         raise refuse([f"{path}: was not written by coralquake"])
     return ds
+
+
+def _open(path: Path) -> xr.Dataset:
+    """All of it, in memory."""
+    with opened_results(path) as ds:
+        return ds.load()
 
 
 def draw(ds: xr.Dataset, path: Path) -> None:
@@ -56,7 +66,8 @@ def tabulate(path: Path, csv: Path | None) -> None:
     frame = table(ds)
     if csv is not None:
         try:
-            frame.to_csv(csv, index=False)
+            with nullcontext(csv) if csv.exists() and not csv.is_file() else whole(csv) as target:  # a device stays one
+                frame.to_csv(target, index=False)
         except OSError as error:
             raise refuse([f"{csv}: cannot be written: {error.strerror or error}"]) from None
         return

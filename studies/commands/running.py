@@ -22,13 +22,14 @@ from ..domain_size import convergence_sentences, is_domain_size, source_sentence
 from ..messages import StudyError
 from ..plan import Study, shipped_studies
 from ..provenance import study_hash
+from ..rerun import rerun as repeat
 from ..runner import Run, run_into
 from ..show import TRACE_HEAD, trace_line
 from ..store import Store
 from ..tables import failures, sentences
 from . import console
 from .console import DONE, INTERRUPTED, SOME_FAILED, load_all, refuse, say
-from .reading import draw
+from .reading import draw, opened_results
 
 NARROW = 60
 """Characters; on terminals narrower than this the summary is lines, not a table that would cut its numbers."""
@@ -116,26 +117,48 @@ def _make(study: Study, path: Path, workers: int | None, fresh: bool) -> float:
     if not fresh and _is_finished(study, path):
         return 0.0
     start = time.perf_counter()
+    with _watched(study.name, path) as watch:
+        run_into(path, study, workers, watch, fresh)
+    return time.perf_counter() - start
+
+
+Watch = Callable[[Run], Callable[[int], None]]
+"""Told of a run that begins, gives what is told of its progress."""
+
+
+@contextmanager
+def _bar(name: str) -> Iterator[Watch]:
+    """A bar that begins where a run does; SIGTERM stops the run as Ctrl-C would."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
+    with Progress(*columns, console=console.err) as bar, _stopped_by_sigterm():
+
+        def begin(run: Run) -> Callable[[int], None]:
+            total = run.study.case_steps
+            task = bar.add_task(name, total=total, completed=total - run.steps_left)
+            if run.n_there:
+                bar.console.print(f"{name}: {run.n_there} of {in_batches(len(run.entries))} there already", markup=False)
+            return partial(bar.advance, task)
+
+        yield begin
+
+
+@contextmanager
+def _watched(name: str, path: Path) -> Iterator[Watch]:
+    """As `_bar`; what stops the run is told in one line, with how to go on."""
     runs: list[Run] = []
     try:
-        with Progress(*columns, console=console.err) as bar, _stopped_by_sigterm():
-            task = bar.add_task(study.name, total=study.case_steps)
+        with _bar(name) as begin:
 
-            def watch(begun: Run) -> Callable[[int], None]:
-                runs.append(begun)
-                bar.advance(task, study.case_steps - begun.steps_left)
-                if begun.n_there:
-                    there = f"{begun.n_there} of {in_batches(len(begun.entries))} there already"
-                    bar.console.print(f"{study.name}: {there}", markup=False)
-                return partial(bar.advance, task)
+            def watch(run: Run) -> Callable[[int], None]:
+                runs.append(run)
+                return begin(run)
 
-            run_into(path, study, workers, watch, fresh)
+            yield watch
     except StudyError as error:
         raise refuse(error.mistakes) from None
     except KeyboardInterrupt:
@@ -143,7 +166,25 @@ def _make(study: Study, path: Path, workers: int | None, fresh: bool) -> float:
         raise typer.Exit(INTERRUPTED) from None
     except OSError as error:
         raise refuse([f"{_place(error, path)}: {_why(error)} {_kept(runs)}"]) from None
-    return time.perf_counter() - start
+
+
+def rerun(path: Path, workers: int | None) -> None:
+    """Repeat the study of a results file and say whether the results are the same."""
+    with opened_results(path) as ds:
+        name = str(ds.attrs["study_name"])
+    try:
+        with _bar(name) as begin:
+            found = repeat(path, workers, begin)
+    except StudyError as error:
+        raise refuse(error.mistakes) from None
+    except KeyboardInterrupt:
+        console.err.print(f"Stopped; nothing is said of {path}.", markup=False, soft_wrap=True)
+        raise typer.Exit(INTERRUPTED) from None
+    except OSError as error:
+        raise refuse([f"{error.filename or path}: {_why(error)}"]) from None
+    for line in found.in_words():
+        say(line)
+    raise typer.Exit(DONE if found.agrees else SOME_FAILED)
 
 
 def in_batches(n: int) -> str:

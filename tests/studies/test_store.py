@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from engine import Status
-from studies import StudyError, make_study, run_study, store
+from studies import StudyError, make_study, provenance, run_study
 from studies.plan import Batch
 from studies.runner import Run
 from studies.store import Entry, Names, Store, in_ranges, opened, verified, write_batch
@@ -56,11 +56,11 @@ def test_the_bytes_of_a_record_decide(tmp_path):
 
 
 def test_versions_sources_and_processor_decide(monkeypatch):
-    found = {store.machine.__wrapped__()}
+    found = {provenance.machine.__wrapped__()}
     for name, other in (("version", lambda package: "0"), ("get_host_cpu_name", lambda: "other"), ("MAKERS", ())):
         with monkeypatch.context() as context:
-            context.setattr(store, name, other)
-            found.add(store.machine.__wrapped__())
+            context.setattr(provenance, name, other)
+            found.add(provenance.machine.__wrapped__())
     assert len(found) == 4
 
 
