@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 STUDY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help install study test verify figures versus bench bench-large check check-platforms clean
+.PHONY: help install study test verify figures versus bench bench-large torture check check-platforms clean
 
 help: ## list the targets
 	@echo "make study              run all named studies, from nothing; results and figures in results/"
@@ -22,6 +22,7 @@ help: ## list the targets
 	@echo "make versus             OpenSees and coralquake on the same model, one figure: results/versus.png"
 	@echo "make bench              all timings, beside OpenSees where it can be installed; some minutes; results/bench.json"
 	@echo "make bench-large        10,000 cases of 1,000 steps on two cores: seconds, memory, results/large.nc"
+	@echo "make torture            kill a run 50 times at random moments, start it again, compare; some minutes"
 	@echo "make check              style, format, import contract, types"
 	@echo "make check-platforms    do the pinned versions have wheels on every platform and Python? installs nothing"
 	@echo "make install            make .venv with the command $(BIN)/coralquake"
@@ -71,6 +72,9 @@ bench: .venv/peer
 bench-large: .venv/installed
 	$(BIN)/python -m benchmarks.large
 
+torture: .venv/tools
+	$(BIN)/python -m tests.torture
+
 check: .venv/tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -84,3 +88,4 @@ clean:
 	rm -rf .venv build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 	find results -type f ! -name README.md -delete
+	find results -mindepth 1 -type d -empty -delete

@@ -168,12 +168,12 @@ def _warnings(study: Study, model: Model) -> list[str]:
         found.append(f"the net uplift of the pressure reaches {uplift:.3g} times the box's weight: it leaves its floor")
     found += [line for line in (_strong_pressure(study), _short_waves(study)) if line]
     if (needed := results_bytes(study, model)) > MOST_BYTES:
-        found.append(f"the results take about {in_bytes(needed)} of memory; raise output.every, or split the study")
+        found.append(f"the results take about {in_bytes(needed)}, on disk and in memory where they are drawn; raise output.every")
     return [*found, *_implausible_motions(study), *_without_effect(study)]
 
 
 MOST_BYTES = 4e9
-"""Of results; a laptop holds them twice while they are written."""
+"""Of results; their batches take as much on disk, figures read them into memory."""
 
 
 CONCRETE = 40e6

@@ -25,8 +25,8 @@ TOLERANCE = 1e-9
 NUDGE = 2.0**-50
 """Relative change of the loads, a few roundings, that moves a chaotic case by more than the tolerance."""
 
-OF_ROUNDING = ("iterations", "residual", "source_test", "energy_error", "contact_drift")
-"""Variables that are nothing but rounding, or how it was fought: elsewhere they are others."""
+OF_ROUNDING = ("iterations", "residual", "source_test", "energy_error", "contact_drift", "reason")
+"""Variables that are nothing but rounding, or how it was fought, and words with such numbers: elsewhere they are others."""
 
 ROW_BYTES = 64 * 2**20
 """Of a variable that is compared at a time."""
@@ -168,7 +168,7 @@ def _chaotic(study: Study, after: xr.Dataset, cases: tuple[int, ...], workers: i
     nudged = replace(study, axes=(axis,), cases=tuple(_nudged(study.cases[case]) for case in cases), sizes=None)
     moved = run_study(nudged, workers).drop_vars("one_case")
     shared = [name for name in moved.data_vars if name in flat and moved[name].shape == flat[name].shape]
-    _, found = _compared(nudged, flat[shared].drop_vars("scaled_by"), moved[shared], exact=False)
+    _, found = _compared(nudged, flat[shared].drop_vars(["solved_as", "scaled_by"]), moved[shared], exact=False)
     return tuple(cases[i] for i in found)
 
 

@@ -489,7 +489,7 @@ def test_results_that_hardly_fit_in_memory_are_warned_of():
     needed = results_bytes(study, build_model(study.cases[0]))
     assert needed > MOST_BYTES
     assert (
-        f"the results take about {in_bytes(needed)} of memory; raise output.every, or split the study"
+        f"the results take about {in_bytes(needed)}, on disk and in memory where they are drawn; raise output.every"
         in advise(study, 1).warnings
     )
     assert not [w for w in warnings_of(text.replace("num = 1000", "num = 100")) if "memory" in w]
