@@ -21,6 +21,9 @@ every hundred steps."""
 TICK = 1.0
 """[s] between two looks at who is silent. A computer that sleeps meanwhile makes nobody silent for longer than twice this."""
 
+MOST_STILLBORN = 10
+"""Processes that are killed before they are ready, one after the other, before no further one is started."""
+
 _SPAWN = get_context("spawn")
 
 Function = Callable[[Any, Callable[[int], None]], Any]
@@ -58,6 +61,7 @@ class Crew:
     def __init__(self, size: int, function: Function, patience: float = PATIENCE) -> None:
         self._size, self._function, self._patience = size, function, patience
         self._members: list[_Member] = []
+        self._stillborn = 0
 
     def __enter__(self) -> Self:
         self._fill()
@@ -128,8 +132,9 @@ class Crew:
     def _lost(self, member: "_Member", reason: str) -> Iterator[tuple[Any, Any]]:
         self._members.remove(member)
         code = member.end()
-        if code > 0 and not member.ready:
-            raise StartError(f"a process that computes ended at its start (exit code {code})")
+        self._stillborn = 0 if member.ready else self._stillborn + 1
+        if not member.ready and (code >= 0 or self._stillborn > MOST_STILLBORN):
+            raise StartError(f"a process that computes {_in_words(code)} at its start")
         if member.ticket is not None:
             yield member.ticket, Broken(reason or _in_words(code))
 

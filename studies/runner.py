@@ -78,6 +78,7 @@ def write_dataset(ds: xr.Dataset, path: Path) -> None:
 @contextmanager
 def _written(path: Path) -> Iterator[Path]:
     """As `files.whole`, for netCDF4, which tells of a full disk as RuntimeError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with whole(path) as part:
             yield part

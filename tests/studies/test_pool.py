@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from studies import pool
-from studies.pool import ONE_THREAD, Broken, Crew
+from studies.pool import ONE_THREAD, Broken, Crew, StartError
+
+from .poison import Poison
 
 
 def doubled(task, progress):
@@ -32,10 +34,10 @@ def doubled(task, progress):
     return 2 * task
 
 
-def worked(size, tasks, patience=600.0):
+def worked(size, tasks, patience=600.0, function=doubled):
     """Answers by task, and progress by task, of a crew that gets all of these."""
     found, told, left = {}, Counter(), list(tasks)
-    with Crew(size, doubled, patience) as crew:
+    with Crew(size, function, patience) as crew:
         while left or crew.busy:
             while left and crew.free:
                 task = left.pop(0)
@@ -87,7 +89,14 @@ def test_processes_that_cannot_start_are_told(tmp_path):
     script.write_text("from tests.studies.test_pool import worked\nworked(1, [1])\n")
     answer = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=100)
     assert answer.returncode == 1
-    assert "StartError: a process that computes ended at its start (exit code 1)" in answer.stderr
+    assert "StartError: a process that computes ended with exit code 1 at its start" in answer.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such signal")
+def test_processes_that_are_killed_at_their_start_are_not_started_for_ever(monkeypatch):
+    monkeypatch.setattr(pool, "MOST_STILLBORN", 2)
+    with pytest.raises(StartError, match=r"was killed .* at its start"):
+        worked(1, [1], function=Poison())
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc"), reason="asks /proc for the processes")
