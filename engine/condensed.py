@@ -79,4 +79,5 @@ class Condensed:
 
     def forget(self, lanes: int | slice) -> None:
         """Drop the inverses kept for these lanes; their flexibility or their joints have changed."""
-        self.of.work.state[lanes] = -1
+        self.of.work.place[lanes] = -1
+        self.of.work.size[lanes] = 0

@@ -11,17 +11,18 @@ import numpy as np
 
 from .direct import EQUATION_TOLERANCE, direct
 from .follow import follow
-from .inverse import Inverse
+from .inverse import Inverse, let_go
 from .jit import kernel, summing_kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
 from .states import Kept, Points
 
 UNIT_ROUNDOFF = 2.0**-53
 STATE_TOLERANCE = 1e-13  # ties within rounding of the largest gap or force keep the state they have
-NEWTON_ROUNDS = 2  # direct solves between sweeps
-FOLLOW_AFTER = 10  # direct solves before the path is followed
+NEWTON_ROUNDS = 4  # direct solves between sweeps
+FOLLOW_AFTER = 20  # direct solves before the path is followed
 FIRST_SWEEPS = 8  # sweeps of the first time, doubled every time
-QUIET = 2  # sweeps without another state, after which more of them are not worth their while
+QUIET = 2  # sweeps without another state, after which more of them are not worth their while,
+LONG = 4  # unless they begin to be many: then this part of them, since slow ones come to rest before they arrive
 
 
 @kernel
@@ -107,11 +108,11 @@ def _sweep(points, g_free, lam, Gl, proposal):
 
 @kernel
 def _sweep_on(points, g_free, lam, Gl, proposal, most):
-    """Sweeps until the states have stood still for QUIET of them, `most` at most."""
+    """Sweeps until the states have stood still for QUIET of them, or a LONG part of `most`; `most` at most."""
     quiet = 0
     for _ in range(most):
         quiet = quiet + 1 if _sweep(points, g_free, lam, Gl, proposal) else 0
-        if quiet == QUIET:
+        if quiet == max(QUIET, most // LONG):
             return
 
 
@@ -130,8 +131,8 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     Returns (rounds, residual): how many direct solves it took, -1 where `max_rounds` did not do, and the relative residual.
     """
     points = Points(G, law.k_n[lane], law.k_s[lane], law.mu[lane], slip)
-    inverse = Inverse(work.matrix[lane], work.unknown[lane], work.place[lane], work.tie[lane], work.state[lane], work.size[lane])
-    kept = Kept(inverse, work.work, work.x, work.answer, work.product, work.missing)
+    inverse = Inverse(work.matrix[lane], work.point[lane], work.place[lane], work.idle[lane], work.size[lane])
+    kept = Kept(inverse, work.work, work.wanted, work.answer, work.product, work.missing)
     proposal, g_tol = work.proposal, STATE_TOLERANCE * _largest(g_free)
     work.swept[:] = lam
     proposal[:] = state
@@ -139,16 +140,19 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     if not np.isfinite(np.sum(g_free)):
         return -1, np.nan
     for attempt in range(1, max_rounds + 1):
-        residual = direct(points, kept, g_free, proposal, g, lam)
+        residual, _ = direct(points, kept, g_free, proposal, g, lam)
         if not np.isfinite(residual):
             break
         work.tried[:] = proposal
         held = _revise(points, g, lam, g_tol, STATE_TOLERANCE * _largest(lam), proposal)
         if held and (residual <= EQUATION_TOLERANCE or residual <= _rounding(G, g_free, lam, work.product)):
             state[:] = work.tried
+            let_go(inverse, state, work.work)
             return attempt, residual
         if attempt == FOLLOW_AFTER:
-            follow(points, kept, work, g_free, proposal, g, lam)
+            for near in (True, False):
+                if follow(points, kept, work, g_free, near, proposal, g, lam):
+                    break
         elif attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
             if attempt % (2 * NEWTON_ROUNDS) != 0:
                 work.swept[:] = lam

@@ -1,22 +1,27 @@
 """The condensed joint equations g + G lambda(g) = g_free of one lane, solved for given states of the points (D9).
 
-Unknowns are the forces of closed points, which keeps the system well conditioned however stiff the joint: a closed point adds
-1/k to the diagonal. Their inverse is kept and brought along with the states (`inverse`); where its rounding shows, or the states
-are all new, the equations are factorised.
+Unknowns are forces, which keeps the system well conditioned however stiff the joint: a closed point adds 1/k to the diagonal. The
+inverse for a set of bonded points is kept (`inverse`), those that slide or have opened are released from it (`release`); where its
+rounding shows, or the states are all new, it is built anew.
 """
 
 import numpy as np
 
-from .dense import solve
-from .inverse import build, multiplied, updated
+from .blocks import multiplied
+from .inverse import build, hold
 from .jit import kernel, summing_kernel
-from .joint import OPEN, STICK, slip_sign
+from .joint import OPEN, STICK
+from .release import release, released_forces, tie
 
 EQUATION_TOLERANCE = 1e-12
 """Relative residual of D9."""
 
 GAP_TOLERANCE = 1e-11
 """Residual over the gaps beyond which a solution is refined; a floating box, say, has free gaps a million times larger."""
+
+
+PASSES = 5
+"""Solves in a row, each for what the one before has left; a new inverse costs as much as fifty."""
 
 
 @kernel
@@ -55,30 +60,32 @@ def residual(g_free, g, Gl):
 
 
 @kernel
-def _right_hand_side(points, inverse, source, slip_factor, x):
-    """Entries of `source` that belong to the unknowns, less the slip (times `slip_factor`) of sticking points."""
+def _forces_wanted(points, kept, source, with_slip, n_released):
+    """Forces of the points held, for gaps `source`, less the slip at the first solve, into kept.answer."""
+    inverse, x = kept.inverse, kept.wanted
     for k in range(inverse.size[0]):
-        i = inverse.unknown[k]
-        x[k] = source[i]
-        if i % 2 == 1:
-            x[k] -= slip_factor * points.slip[i // 2]
+        p = inverse.point[k]
+        x[2 * k] = source[2 * p]
+        x[2 * k + 1] = source[2 * p + 1] - (points.slip[p] if with_slip else 0.0)
+    multiplied(inverse.matrix, 2 * inverse.size[0], x, kept.answer)
+    released_forces(inverse, n_released, kept.work, kept.answer)
 
 
 @kernel
-def _take(points, inverse, x, add, g, lam):
+def _take(points, inverse, state, force, add, g, lam):
     """Forces found into lam (`add` corrects those there), just as the states want them, and gaps of closed points into g."""
-    for p in range(points.mu.shape[0]):
-        n, s, state = 2 * p, 2 * p + 1, inverse.state[p]
-        if state == OPEN:
+    for p in range(state.shape[0]):
+        n, s, k = 2 * p, 2 * p + 1, 2 * inverse.place[p]
+        if state[p] == OPEN:
             lam[n] = lam[s] = 0.0
             continue
-        lam[n] = x[inverse.place[n]] + (lam[n] if add else 0.0)
+        lam[n] = force[k] + (lam[n] if add else 0.0)
         g[n] = lam[n] / points.k_n[p]
-        if state == STICK:
-            lam[s] = x[inverse.place[s]] + (lam[s] if add else 0.0)
+        if state[p] == STICK:
+            lam[s] = force[k + 1] + (lam[s] if add else 0.0)
             g[s] = points.slip[p] + lam[s] / points.k_s[p]
         else:
-            lam[s] = -slip_sign(state) * points.mu[p] * lam[n]
+            lam[s] = -tie(points, state[p], p) * lam[n]
 
 
 @kernel
@@ -92,48 +99,34 @@ def _free_gaps(g_free, Gl, state, g):
 
 
 @kernel
-def _pass(points, kept, source, slip_factor, factored, g_free, g, lam):
-    """Solve for the forces that `source` calls for, then the gaps; the `residual`. A `slip_factor` of 0 corrects lam."""
-    inverse, x, y = kept.inverse, kept.unknown, kept.answer
-    _right_hand_side(points, inverse, source, slip_factor, x)
-    if factored:
-        solve(kept.work.equations, inverse.size[0], kept.work.pivot, x)
-    else:
-        multiplied(inverse, x, y)
-    _take(points, inverse, x if factored else y, slip_factor == 0.0, g, lam)
-    product(points.G, lam, kept.product)
-    _free_gaps(g_free, kept.product, inverse.state, g)
-    return residual(g_free, g, kept.product)
-
-
-@kernel
-def _solution(points, kept, factored, g_free, g, lam):
-    """Solve with the inverse or with the factors and refine once where that is called for; the relative residual."""
+def solution(points, kept, state, n_released, g_free, g, lam):
+    """Solve with what `direct` has made ready for these states, and refine as long as it is called for and helps; the residual."""
     found = of_gaps = 0.0
-    for attempt in range(2):
+    for attempt in range(PASSES):
+        before = found
         if attempt == 0:
             kept.missing[:] = g_free
         else:
             for i in range(g.shape[0]):
                 kept.missing[i] = g_free[i] - kept.product[i] - g[i]
-        found, of_gaps = _pass(points, kept, kept.missing, 1.0 - attempt, factored, g_free, g, lam)
-        if not (found > 0.1 * EQUATION_TOLERANCE or of_gaps > GAP_TOLERANCE):
+        _forces_wanted(points, kept, kept.missing, attempt == 0, n_released)
+        _take(points, kept.inverse, state, kept.answer, attempt > 0, g, lam)
+        product(points.G, lam, kept.product)
+        _free_gaps(g_free, kept.product, state, g)
+        found, of_gaps = residual(g_free, g, kept.product)
+        if not (found > 0.1 * EQUATION_TOLERANCE or of_gaps > GAP_TOLERANCE) or (attempt > 0 and found > 0.1 * before):
             break
     return found
 
 
 @kernel
 def direct(points, kept, g_free, state, g, lam):
-    """Solve for given states. The relative residual; infinity where the equations are singular."""
-    found = np.inf
-    for factored in (False, True):
-        inverse, work = kept.inverse, kept.work
-        if factored:
-            if not build(points, inverse, state, work):
-                return np.inf
-        elif not updated(points, inverse, state, work):
-            continue
-        found = _solution(points, kept, factored, g_free, g, lam)
+    """Solve for given states: (relative residual, number of released degrees of freedom); infinity where that is singular."""
+    found, n_released, inverse, work = np.inf, -1, kept.inverse, kept.work
+    for anew in (False, True):
+        ready = build(points, inverse, state, work) if anew else hold(points, inverse, state, work)
+        n_released = release(points, inverse, state, work) if ready else -1
+        found = np.inf if n_released < 0 else solution(points, kept, state, n_released, g_free, g, lam)
         if found <= EQUATION_TOLERANCE:
             break
-    return found
+    return found, n_released

@@ -1,18 +1,23 @@
 """The last resort of the joint solve: follow the solution along a path on which it cannot be missed (D9).
 
 The law is piecewise linear in g, so the solution for g_free moving on a straight line is a chain of straight pieces, each known
-from a direct solve at both ends (Katzenelson 1965, for resistive networks). From all points open and pushed apart the chain
-leads to g_free; where the solution is unique it can neither return to its start nor run away. Exact ties are not treated.
+from a direct solve at both ends (Katzenelson 1965, for resistive networks). It starts where a solution is known: any gaps are one,
+with the forces that the law gives, for the g_free that follows. The gaps of the last step are near, and the chain is short. From all
+points open and pushed apart it is long, but where the solution is unique it can neither return to its start nor run away. Exact
+ties are not treated.
 """
 
 import numpy as np
 
-from .direct import direct
+from .direct import direct, product, solution
 from .jit import kernel
-from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, slip_sign
+from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, respond, slip_sign
 
 MAX_PIECES = 40
 """Pieces of the path a joint point."""
+
+WITHIN = 0.99
+"""Of its shear that a point keeps at the start of a path: one that slid stands at the border of two states otherwise."""
 
 
 @kernel
@@ -39,24 +44,47 @@ def _borders(state, mu):
 
 
 @kernel
-def follow(points, kept, work, g_free, state, g, lam):
-    """Follow the solution from all points open, g_free pushed apart, to g_free itself, a border of states at a time.
+def _begin_near(points, work, state):
+    """Gaps of the last step, the sliding points a little within friction, as the start of a path."""
+    for p in range(state.shape[0]):
+        n, s, slip = 2 * p, 2 * p + 1, points.slip[p]
+        work.far_gap[n], work.far_gap[s] = work.start[n], slip + WITHIN * (work.start[s] - slip)
+        code, work.far_force[n], work.far_force[s] = respond(
+            work.far_gap[n], work.far_gap[s], slip, points.k_n[p], points.k_s[p], points.mu[p]
+        )
+        state[p] = np.int8(code)
+    product(points.G, work.far_force, work.far)
+    for i in range(work.far.shape[0]):
+        work.far[i] += work.far_gap[i]
 
-    The law is piecewise linear, so the path is a chain of straight pieces, each a direct solve at both ends; it cannot return
-    to its start, where the solution is unique, nor run away, so it arrives. `state` receives the states found.
-    """
+
+@kernel
+def _begin_afar(points, work, g_free, state):
+    """All points open, g_free pushed apart, as the start of a path."""
     size = 0.0
     for p in range(state.shape[0]):
         size = max(size, abs(g_free[2 * p]) + abs(g_free[2 * p + 1]) + abs(points.slip[p]))
-    work.far[:] = g_free
+        state[p] = OPEN
     for p in range(state.shape[0]):
-        work.far[2 * p] += 3.0 * (1.0 + points.mu[p]) * size
-    state[:] = OPEN
+        work.far[2 * p] = g_free[2 * p] + 3.0 * (1.0 + points.mu[p]) * size
+        work.far[2 * p + 1] = g_free[2 * p + 1]
+
+
+@kernel
+def follow(points, kept, work, g_free, near, state, g, lam):
+    """Follow the solution from the gaps of the last step, in work.start, or from afar, to g_free, a border of states at a time.
+
+    The law is piecewise linear, so the path is a chain of straight pieces, each a direct solve at both ends. `state` receives
+    the states found; False where the path does not arrive.
+    """
+    if near:
+        _begin_near(points, work, state)
+    else:
+        _begin_afar(points, work, g_free, state)
     moved, came_from, forwards = -1, OPEN, True
     for _ in range(MAX_PIECES * state.shape[0]):
-        solved = direct(points, kept, work.far, state, work.far_gap, work.far_force)
-        solved += direct(points, kept, g_free, state, g, lam)
-        if not np.isfinite(solved):
+        residual, n_released = direct(points, kept, work.far, state, work.far_gap, work.far_force)
+        if not np.isfinite(residual) or not np.isfinite(solution(points, kept, state, n_released, g_free, g, lam)):
             return False
         if moved >= 0:
             back = SLIP_FORWARD if state[moved] == OPEN else came_from

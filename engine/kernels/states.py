@@ -26,11 +26,11 @@ class Points(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """The inverse kept of one lane, and scratch (m,): unknowns before and after a solve, G lambda, what an equation lacks."""
+    """The inverse kept of one lane, and scratch (m,): gaps wanted of it, forces it gives, G lambda, what an equation lacks."""
 
     inverse: Inverse
     work: Scratch
-    unknown: np.ndarray
+    wanted: np.ndarray
     answer: np.ndarray
     product: np.ndarray
     missing: np.ndarray
@@ -40,13 +40,12 @@ class Workspace(NamedTuple):
     """Inverses of all lanes, lane first as in `Inverse`, and scratch."""
 
     matrix: np.ndarray
-    unknown: np.ndarray
+    point: np.ndarray
     place: np.ndarray
-    tie: np.ndarray
-    state: np.ndarray
+    idle: np.ndarray
     size: np.ndarray
     work: Scratch
-    x: np.ndarray  # (m,)
+    wanted: np.ndarray  # (m,)
     answer: np.ndarray  # (m,)
     product: np.ndarray  # (m,) G lambda
     missing: np.ndarray  # (m,)
@@ -64,17 +63,16 @@ class Workspace(NamedTuple):
 def workspace(n_point: int, lanes: int) -> Workspace:
     """An empty workspace for `n_point` joint points."""
     m = 2 * n_point
-    x, answer, product, missing, swept, swept_product, free, start, far, far_gap, far_force = np.zeros((11, m))
+    wanted, answer, product, missing, swept, swept_product, free, start, far, far_gap, far_force = np.zeros((11, m))
     proposal, tried = np.zeros((2, n_point), dtype=np.int8)
     return Workspace(
         np.zeros((lanes, m, m)),
-        np.zeros((lanes, m), dtype=np.int64),
-        np.full((lanes, m), -1, dtype=np.int64),
-        np.zeros((lanes, m)),
-        np.full((lanes, n_point), -1, dtype=np.int8),
+        np.zeros((lanes, n_point), dtype=np.int64),
+        np.full((lanes, n_point), -1, dtype=np.int64),
+        np.zeros((lanes, n_point), dtype=np.int64),
         np.zeros((lanes, 1), dtype=np.int64),
         scratch(m),
-        x,
+        wanted,
         answer,
         product,
         missing,

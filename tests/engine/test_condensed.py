@@ -198,10 +198,11 @@ def test_forgetting_an_inverse_gives_the_bits_of_a_new_solver(system, matrix, la
     """Of the lane that is forgotten, after whatever it has solved; the others go on with theirs."""
     used, found = Condensed(system, matrix), State.at_rest(system).contact
     used.solve(lanes.standing.copy(), lanes.law, N_LANE, before, found)
-    first, states = used.u.copy(), used.of.work.state.copy()
+    first, places = used.u.copy(), used.of.work.place.copy()
     used.forget(0)
-    assert (used.of.work.state[0] == -1).all()
-    np.testing.assert_array_equal(used.of.work.state[1:], states[1:])
+    assert (used.of.work.place[0] == -1).all()
+    assert used.of.work.size[0] == 0
+    np.testing.assert_array_equal(used.of.work.place[1:], places[1:])
     used.solve(lanes.standing.copy(), lanes.law, N_LANE, before, found)
     np.testing.assert_array_equal(used.u[:, 0], first[:, 0])
     used.solve(-lanes.standing, lanes.law, N_LANE, before, found)

@@ -153,7 +153,7 @@ def test_no_failure_is_told_where_every_lane_is_solved(rng, condensation):
 def test_bits_of_a_lane_depend_neither_on_its_companions_nor_on_their_failure(rng, condensation):
     law_, rhs, before = law(rng), 5 * rng.normal(size=(N, LANES)), nothing()
     _, found, report, y, _ = solved(condensation, law_, rhs, before)
-    condensation.work.state[:] = -1
+    condensation.work.place[:], condensation.work.size[:] = -1, 0
     broken = rhs.copy()
     broken[:, 1] = np.nan
     any_failed, other, told, other_y, _ = solved(condensation, law_, broken, before)

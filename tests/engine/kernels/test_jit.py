@@ -195,8 +195,8 @@ def test_sample_of_the_suite_passes_without_compilation():
     sample = [
         str(here / f"test_{name}.py")
         for name in (
-            *("clock", "condense", "contact", "dense", "direct", "inverse", "joint"),
-            *("loop", "march", "observe", "panels", "sparse", "triangle", "vector"),
+            *("blocks", "clock", "condense", "contact", "dense", "direct", "follow", "inverse", "joint"),
+            *("loop", "march", "observe", "panels", "release", "sparse", "triangle", "vector"),
         )
     ]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
