@@ -1,8 +1,8 @@
 """The condensed joint equations g + G lambda(g) = g_free of one lane, solved for given states of the points (D9).
 
 Unknowns are forces, which keeps the system well conditioned however stiff the joint: a closed point adds 1/k to the diagonal. The
-inverse for a set of bonded points is kept (`inverse`), those that slide or have opened are released from it (`release`); where its
-rounding shows, or the states are all new, it is built anew.
+inverse for a set of bonded points is kept (`inverse`), and those that slide or have opened are released from it (`release`); it
+is built anew where its rounding shows, or where the states are all new.
 """
 
 import numpy as np
@@ -100,7 +100,7 @@ def _free_gaps(g_free, Gl, state, g):
 
 @kernel
 def solution(points, kept, state, n_released, g_free, g, lam):
-    """Solve with what `direct` has made ready for these states, and refine as long as it is called for and helps; the residual."""
+    """Solve with what `direct` has made ready for these states, and refine while that is called for and helps; the residual."""
     found = of_gaps = 0.0
     for attempt in range(PASSES):
         before = found

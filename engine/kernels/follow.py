@@ -1,10 +1,10 @@
 """The last resort of the joint solve: follow the solution along a path on which it cannot be missed (D9).
 
 The law is piecewise linear in g, so the solution for g_free moving on a straight line is a chain of straight pieces, each known
-from a direct solve at both ends (Katzenelson 1965, for resistive networks). It starts where a solution is known: any gaps are one,
-with the forces that the law gives, for the g_free that follows. The gaps of the last step are near, and the chain is short. From all
-points open and pushed apart it is long, but where the solution is unique it can neither return to its start nor run away. Exact
-ties are not treated.
+from a direct solve at both ends (Katzenelson 1965, for resistive networks). It starts where a solution is known: any gaps are
+one, with the forces that the law gives, for the g_free that follows from both. From the gaps of the last step the chain is short.
+From all points open and pushed apart it is long, but where the solution is unique it can neither return to its start nor run
+away. Exact ties are not treated.
 """
 
 import numpy as np

@@ -156,10 +156,10 @@ def hold(points, inverse, state, work):
             count += 1
     if count > REBUILD_FROM * inverse.size[0] + PAIR:
         return False
+    good = True
     for first in range(0, count, PAIR):
-        if not _add(points, inverse, work.queue[first : min(first + PAIR, count)], work):
-            return False
-    return True
+        good = good and _add(points, inverse, work.queue[first : min(first + PAIR, count)], work)
+    return good
 
 
 @kernel

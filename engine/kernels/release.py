@@ -1,8 +1,8 @@
 """Points that slide or have opened, released from a bonded set (D9).
 
 A released degree of freedom has a gap of its own on top of what the stiffness of its joint gives. The inverse H of the bonded
-equations tells the forces: lambda = H (g_free - slip - gap), and the gaps are such that an open point carries nothing and a sliding
-one just the shear that friction allows, lambda_s + tie lambda_n = 0. That is a small system, whose coefficients stand in H.
+equations tells the forces: lambda = H (g_free - slip - gap), and the gaps are such that an open point carries nothing and a
+sliding one just the shear that friction allows, lambda_s + tie lambda_n = 0. The coefficients of that small system stand in H.
 """
 
 from .blocks import subtract_rows
