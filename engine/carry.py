@@ -35,9 +35,13 @@ def carried_down(model: Model, motions: Sequence[Floats], depth: float) -> list[
     n = len(motions[0])
     n_padded = scipy.fft.next_fast_len(PADDING * n, real=True)
     z = np.exp(2j * np.pi * (np.arange(n_padded // 2 + 1) / n_padded).clip(max=NEARLY_HALF))
-    transfer = _within_over_base(model, depth, z)
-    transfer *= np.maximum(1.0, WATER_LEVEL / np.abs(transfer))
+    transfer = _at_least(WATER_LEVEL, _within_over_base(model, depth, z))
     return [_filtered(motion, transfer, n_padded)[:n] for motion in motions]
+
+
+def _at_least(size: float, transfer: Complex) -> Complex:
+    """The transfer function in its own phase, with this magnitude where its own is less; it may be zero."""
+    return np.maximum(np.abs(transfer), size) * np.exp(1j * np.angle(transfer))
 
 
 def _filtered(motion: Floats, divisor: Complex, n_padded: int) -> Floats:
