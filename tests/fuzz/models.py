@@ -180,7 +180,12 @@ def _motion(rng: Generator, sides: str, time: Table, domain: Table, features: li
         step = dt * float(rng.choice([0.5, 1, 2]))
         ground = _log(rng, -2, np.log10(0.2)) / step
         found["synthetic"] = {"seed": int(rng.integers(2**31)), "step": step, "ground_frequency": ground}
-        found["synthetic"] |= {"low_frequency": 0.1 * ground, "rise": 0.2 * length, "plateau": 0.5 * length, "decay": 0.2 * length}
+        found["synthetic"] |= {
+            "low_frequency": 0.1 * ground,
+            "rise": 0.2 * length,
+            "plateau": 0.5 * length,
+            "decay": 0.2 * length,
+        }
     elif kind == "ricker":
         found["ricker"] = {"frequency": _log(rng, -2, np.log10(0.2)) / dt, "arrival": length * rng.uniform(0, 0.9)}
     return found
