@@ -61,9 +61,14 @@ class Joints(namedtuple("Joints", "B k_n k_s mu slip")):
         return rows
 
     def excess(self, A, load, u):
-        """F(u) = A u + B' force - load with the norm that is accepted; no less than the rounding of A u, where a box floats."""
+        """F(u) = A u + B' force - load with the norm that is accepted.
+
+        No less than the rounding of A u, where a box floats, and of k B u, where a joint is stiff.
+        """
         force = self.B.T @ self.force(u).ravel()
-        accepted = max(RESIDUAL * max(norm(load), norm(force)), np.finfo(float).eps * norm(abs(A) @ abs(u)))
+        sizes = (abs(self.B) @ abs(u)).reshape(-1, 2) + np.outer(abs(self.slip), [0, 1])
+        stiff = abs(self.B.T) @ np.einsum("pij,pj->pi", abs(self.tangent(self.states(u))), sizes).ravel()
+        accepted = max(RESIDUAL * max(norm(load), norm(force)), np.finfo(float).eps * norm(abs(A) @ abs(u) + stiff))
         return A @ u + force - load, accepted
 
     def matrix(self, A, state):
@@ -189,17 +194,28 @@ def pressure_load(whole, mesh, pressure, thickness=1.0):
     return whole.T.T @ load.ravel()
 
 
-def newmark_step(whole, joints, start, load, dt, alpha, beta, damped=False, newmark_beta=0.25, newmark_gamma=0.5, guess=None):
-    """One step under the load at its end (D4 to D6), written with Newmark's predictors; `damped` puts beta on the joints too."""
+Equation = namedtuple("Equation", "joints A load u_predicted v_predicted a0 a1")
+"""A u + B' force(u) = load of one step, with the joints as they slipped before it, and what u makes of v and a."""
+
+
+def newmark_equation(whole, joints, start, load, dt, alpha, beta, damped=False, newmark_beta=0.25, newmark_gamma=0.5):
+    """The equation of a step under the load at its end (D4 to D6), written with Newmark's predictors; `damped` puts beta on
+    the joints too."""
     u, v, a, joints = start.u, start.v, start.a, joints._replace(slip=start.slip)
     acting = np.column_stack([joints.k_n * (start.state != OPEN), joints.k_s * (start.state == STICK)]).ravel()
     C = alpha * whole.M + beta * (whole.K + damped * whole.B.T @ sp.diags_array(acting) @ whole.B)
     u_predicted, v_predicted = u + dt * v + dt**2 * (0.5 - newmark_beta) * a, v + dt * (1 - newmark_gamma) * a
     a0, a1 = 1 / (newmark_beta * dt**2), newmark_gamma / (newmark_beta * dt)
     rhs = load + whole.M @ (a0 * u_predicted) + C @ (a1 * u_predicted - v_predicted)
-    new = joints.solve(a0 * whole.M + a1 * C + whole.K, rhs, u if guess is None else guess)
-    moved = new - u_predicted
-    return Moment(new, v_predicted + a1 * moved, a0 * moved, joints.slipped(new), joints.states(new))
+    return Equation(joints, a0 * whole.M + a1 * C + whole.K, rhs, u_predicted, v_predicted, a0, a1)
+
+
+def newmark_step(*equation, guess=None, **scheme):
+    """One step, the arguments those of `newmark_equation`; Newton starts from `guess`, else from the start of the step."""
+    of, start = newmark_equation(*equation, **scheme), equation[2]
+    new = of.joints.solve(of.A, of.load, start.u if guess is None else guess)
+    moved = new - of.u_predicted
+    return Moment(new, of.v_predicted + of.a1 * moved, of.a0 * moved, of.joints.slipped(new), of.joints.states(new))
 
 
 def static(whole, joints, loads, softness=1e-3, steps=10, most=5000):

@@ -66,8 +66,8 @@ def _places(rng: Generator, features: list[str]) -> tuple[Table, Table]:
     width, height = _log(rng, 0.0, 1.1), _log(rng, 0.0, 1.1)
     wall = min(width, height) * rng.uniform(0.04, 0.3)
     room = max(width, height)
-    depth, below = room * rng.uniform(0.02, 3), room * rng.uniform(0.1, 3)
-    left, right = room * rng.uniform(0.1, 3, 2)
+    depth, below = room * rng.uniform(0.02, 2), room * rng.uniform(0.1, 2)
+    left, right = room * rng.uniform(0.1, 2, 2)
     edge = int(rng.integers(20))
     if edge == 0:
         depth = 0.0
@@ -126,14 +126,14 @@ def _mesh(rng: Generator, order: int, box: Table) -> Table:
     size = max(box["width"], box["height"])
     mesh: Table = {
         "order": order,
-        "wall_elements": int(rng.choice([1, 1, 1, 2])),
-        "roof_elements": int(rng.choice([2, 2, 4])),
-        "side_elements": int(rng.choice([2, 2, 4])),
-        "corner_levels": int(rng.choice([0, 0, 0, 1, 2])),
-        "first": size * rng.uniform(0.2, 1),
-        "growth": rng.uniform(1.2, 4),
-        "largest_width": size * rng.uniform(0.7, 3),
-        "largest_height": size * rng.uniform(0.7, 3),
+        "wall_elements": int(rng.choice([1, 1, 1, 1, 2])),
+        "roof_elements": int(rng.choice([2, 2, 2, 4])),
+        "side_elements": int(rng.choice([2, 2, 2, 4])),
+        "corner_levels": int(rng.choice([0, 1, 2, 3], p=[0.8, 0.1, 0.07, 0.03])) if 8 * box["wall"] > size else 0,
+        "first": size * rng.uniform(0.3, 1.2),
+        "growth": rng.uniform(1.5, 4),
+        "largest_width": size * rng.uniform(1, 4),
+        "largest_height": size * rng.uniform(1, 4),
     }
     return mesh | ({"mass": "lumped"} if order == 1 and _chance(rng, 0.3) else {})
 

@@ -1,0 +1,99 @@
+"""The slow reference goes on from the engine's state, step by step, and says of each step of the engine what it is."""
+
+from collections import namedtuple
+from enum import StrEnum
+
+import numpy as np
+
+from engine import Lanes, Model, Spec, State, Stepper, equilibrium, newmark_of
+from tests import reference
+from tests.twin import STEP, Twin, lanes_of, moment, reference_step, step_error, twin_of_model
+
+
+class Verdict(StrEnum):
+    """What a step of the engine is to the reference."""
+
+    AGREES = "agrees to 1e-10"
+    ROUNDING = "agrees to rounding"
+    ANOTHER = "another solution"
+    WRONG = "wrong"
+
+
+Told = namedtuple("Told", "where verdict detail")
+Around = namedtuple("Around", "before after ground lane halved missed")
+"""A lane's moments before and after a step, base acceleration at both, whether it was halved, by how much [m] its gaps are
+missed."""
+
+UNIT = 2.0**-53
+
+
+def told_steps(model: Model, specs: list[Spec], motions: list[np.ndarray], instants: tuple[int, ...]) -> list[Told]:
+    """March the cases from their static state, and judge the steps that end at `instants` (those that there are).
+
+    A case without static state starts at rest, its loads applied at once. A step that no halving solves is the engine's own word.
+    """
+    twin, (lanes, loads) = twin_of_model(model), lanes_of(model, specs, motions)
+    state, found = equilibrium(model.system, lanes, loads, model.frequencies[0])
+    for lane in np.flatnonzero(~found):
+        state.put(int(lane), State.at_rest(model.system))
+    stepper, ground = Stepper(model.system, newmark_of(model.spec), model.rayleigh), lanes.ground
+    stepper.start(state, lanes, ground[0])
+    told, n = [], len(specs)
+    for k in range(1, min(max(instants), len(ground) - 1) + 1):
+        before = [moment(state, twin, lane) for lane in range(n)]
+        halved, report = stepper.step(state, lanes, ground[k - 1], ground[k]), stepper.of.report
+        for lane in range(n) if k in instants else ():
+            if report.rounds[lane] > 0:
+                ends = ground[k - 1 : k + 1, :, lane]
+                missed = report.residual[lane] * _size_of_gaps(state, stepper, lane)
+                around = Around(before[lane], moment(state, twin, lane), ends, lane, bool(halved[lane]), missed)
+                told.append(Told(f"case {lane}, step {k}", *_verdict(model, twin, lanes, specs[lane], around)))
+    return told
+
+
+def _size_of_gaps(state: State, stepper: Stepper, lane: int) -> float:
+    """The larger one of G lambda and of the gaps without forces [m], to which a residual is relative (D9)."""
+    carried = stepper.condensed.G[0] @ state.contact.force[lane]
+    return max(np.linalg.norm(carried), np.linalg.norm(carried + state.contact.gap[lane]))
+
+
+def _verdict(model: Model, twin: Twin, lanes: Lanes, spec: Spec, around: Around) -> tuple[Verdict, str]:
+    before, after = around.before, around.after
+    joints = reference.joints_of(twin.whole, model.joint_materials(spec))
+    step = joints, before, lanes.standing[twin.column, around.lane], around.ground
+    errors, allowed = [], STEP
+    for parts in (2, 4, 8, 16, 32, 64) if around.halved else (1,):
+        for guess in (None, after.u):
+            try:
+                expected = reference_step(model, twin, *step, parts=parts, guess=guess)
+            except ArithmeticError:
+                errors.append(np.inf)
+                continue
+            errors.append(step_error(model, expected, after))
+            if errors[-1] > STEP and not around.halved and allowed == STEP:
+                allowed = max(STEP, _rounding(model, twin, step, around))
+            if errors[-1] <= allowed:
+                verdict = Verdict.AGREES if errors[-1] <= STEP else Verdict.ROUNDING
+                return (verdict if guess is None else Verdict.ANOTHER), f"{errors[0]:.1e}, {allowed:.1e} allowed"
+    return Verdict.WRONG, f"error {min(errors):.1e}, {allowed:.1e} allowed"
+
+
+def _rounding(model: Model, twin: Twin, step: tuple, around: Around) -> float:
+    """Largest error of u, relative to the largest u, that rounding of the equations' own terms may cause.
+
+    A row of n terms is known to n units of the sum of its magnitudes, joints by the residual of their solve as well; what that
+    does to u is |J⁻¹| times it (Skeel), J being the matrix in the states found.
+    """
+    joints, before, standing, ground = step
+    newmark, rayleigh, u = newmark_of(model.spec), model.rayleigh, around.after.u
+    load = standing - twin.whole.inertia @ ground[1]
+    scheme = {"newmark_beta": newmark.newmark_beta, "newmark_gamma": newmark.newmark_gamma, "damped": rayleigh.joints}
+    arguments = twin.whole, joints, before, load, newmark.dt, rayleigh.alpha, rayleigh.beta
+    of = reference.newmark_equation(*arguments, **scheme)
+    D, B = abs(of.joints.tangent(around.after.state)), abs(of.joints.B)
+    gap = (B @ abs(u)).reshape(-1, 2) + np.outer(abs(before.slip), [0, 1])
+    units = UNIT * (np.diff(of.A.indptr).max() + np.diff(of.joints.B.indptr).max())
+    uncertain = np.einsum("pij,pj->pi", D, units * gap + around.missed)
+    error = units * (abs(of.A) @ abs(u) + abs(of.load)) + B.T @ uncertain.ravel()
+    inverse = abs(np.linalg.inv(of.joints.matrix(of.A, around.after.state).toarray()))
+    return float((inverse @ error).max() / max(abs(u).max(), 1e-300))
