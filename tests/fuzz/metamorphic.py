@@ -34,7 +34,7 @@ from engine.mesh import SIDES
 from engine.model import materials
 
 UNIT = 2.0**-53
-MULTIPLE = 100
+MULTIPLE = 10
 """Of the largest of the disturbed marches: these are few draws of the rounding."""
 
 DISTURBED = 3
@@ -125,12 +125,13 @@ def _finest(mesh: Mesh) -> float:
 
 @dataclass(frozen=True)
 class Compared:
-    """How a telling compares: the largest difference over what is allowed, and whether that was small enough to say much."""
+    """How a telling compares: the largest difference over what is allowed, whether that was small enough to say much, and the
+    first step that goes beyond it."""
 
     relation: str
     excess: float
     sharp: bool
-    detail: str = ""
+    step: int = 0
 
 
 Telling = Callable[[March], tuple[Floats, Floats]]
@@ -160,16 +161,18 @@ class Original:
         """Another telling's march beside this one."""
         fails = [each.status > Status.SUBSTEPS for each in (other, *self.disturbed)]
         if any(fails):  # where rounding alone decides whether it is solved, nothing is said
-            return Compared(relation, np.inf if fails[0] and not any(fails[1:]) else 0.0, False, other.status.name)
-        worst, sharp = 0.0, True
+            return Compared(relation, np.inf if fails[0] and not any(fails[1:]) else 0.0, False)
+        worst, sharp, step = 0.0, True, len(self.march.displacement)
         for i, (mine, theirs) in enumerate(zip((self.march.displacement, self.march.stress), back(other), strict=True)):
             noise = np.max([abs((d.displacement, d.stress)[i] - mine).max(axis=1) for d in self.disturbed], axis=0)
             largest = np.maximum.accumulate(abs(mine).max(axis=1))
             allowed = MULTIPLE * np.maximum.accumulate(noise) + 16 * UNIT * largest
             apart = abs(theirs - mine).max(axis=1)
-            worst = max(worst, float((apart / np.where(allowed > 0, allowed, 1e-300)).max()))
+            excess = apart / np.where(allowed > 0, allowed, 1e-300)
+            worst = max(worst, float(excess.max()))
+            step = min(step, int(np.argmax(excess > 1))) if worst > 1 else step
             sharp &= bool(noise.max() <= SHARP * largest[-1])
-        return Compared(relation, worst, sharp)
+        return Compared(relation, worst, sharp, step)
 
 
 def plain(march: March) -> tuple[Floats, Floats]:
@@ -193,7 +196,7 @@ def relations(model: Model, spec: Spec, ground: Floats, rng: np.random.Generator
         ("layer in two", _layer_in_two(model, spec, ground, rng), plain),
     ):
         found.append(original.compared(relation, marched([posed])[0], back))
-    found.append(_mirrored(original, spec, ground))
+    found.append(_in_a_mirror(original, spec, ground))
     found.append(superposed(model, spec, ground, rng))
     return found
 
@@ -279,11 +282,17 @@ MIRRORED = ("A", "C", "B", "D", "S")  # of A, B, C, D, S
 """The right wall becomes the left one; F lies at the right side alone."""
 
 
-def _mirrored(original: Original, spec: Spec, ground: Floats) -> Compared:
+def mirrored(spec: Spec, ground: Floats) -> tuple[Spec, Floats]:
     """The box on the other side of the middle, the motion along x the other way."""
-    image = spec.model_copy(update={"box": spec.box.model_copy(update={"offset": -spec.box.offset})})
+    box = spec.box.model_copy(update={"offset": -spec.box.offset})
+    return spec.model_copy(update={"box": box}), ground * [-1, 1]
+
+
+def _in_a_mirror(original: Original, spec: Spec, ground: Floats) -> Compared:
+    """The original beside its image."""
+    image, motion = mirrored(spec, ground)
     model = build_model(image)
-    (march,) = marched([Posed.of(model, image, ground * [-1, 1])])
+    (march,) = marched([Posed.of(model, image, motion)])
     names = list(model.system.mesh.probes)
 
     def view(wanted: tuple[str, ...], sign: int) -> Callable[[March], March]:
