@@ -17,6 +17,14 @@ LOAD_STEPS = 10
 TOLERANCE = 1e-10
 MAX_ITERATIONS = 500
 
+SOFTENING = 100.0
+SOFTENED_EVERY = 100
+"""Iterations after which the proximal term becomes a hundred times softer: a box that nothing but the last of its friction stops
+goes an even step an iteration until it lies on, the longer the softer the term."""
+
+SOFTEST = 2
+"""Times that it becomes softer."""
+
 
 def equilibrium(system: System, lanes: Lanes, loads: list[Floats], first_frequency: float) -> tuple[State, np.ndarray]:
     """Static state of all lanes, and (LANES,) False where a lane has found none.
@@ -43,9 +51,8 @@ class _Proximal:
     """Steps (K + eta M) u⁺ + B_jᵀ lambda(B_j u⁺) = R + eta M u: Newmark's without damping, from rest, 2/sqrt(eta) long."""
 
     def __init__(self, system: System, eta: float) -> None:
-        self.eta = eta
-        self._M = rows(system.M)
-        self._stepper = Stepper(system, Newmark(2 / np.sqrt(eta)), Rayleigh())
+        self._eta, self._system, self._M = eta, system, rows(system.M)
+        self._steppers: list[Stepper] = []
         self._next = State.at_rest(system)
         self._inertia: Floats = np.zeros((system.n_dof, LANES))
 
@@ -58,10 +65,13 @@ class _Proximal:
         moving = active.copy()
         lost = np.zeros(LANES, dtype=bool)
         trial = state.copy()
-        for _ in range(MAX_ITERATIONS):
+        for iteration in range(MAX_ITERATIONS):
             if not moving.any():
                 break
-            change, failed = self._iterate(trial, lanes, moving)
+            softer = min(iteration // SOFTENED_EVERY, SOFTEST)
+            if softer and iteration % SOFTENED_EVERY == 0:
+                self._stepper(softer).condensed.forget(slice(None))  # or a lane's bits would tell of its companions' iterations
+            change, failed = self._iterate(trial, lanes, moving, softer)
             lost |= moving & failed
             moving &= ~(failed | (change <= TOLERANCE * scale))
         state.motion.u[:, active] = trial.motion.u[:, active]
@@ -69,16 +79,27 @@ class _Proximal:
         commit_joints(lanes.law, none, none, lanes.n_lane, trial.contact, state.contact, state.energy)
         return ~(lost | moving)
 
-    def _iterate(self, trial: State, lanes: Lanes, moving: np.ndarray) -> tuple[Floats, np.ndarray]:
+    def _softened(self, times: int) -> float:
+        """eta after it has become softer so many times."""
+        return self._eta / SOFTENING**times
+
+    def _stepper(self, softer: int) -> Stepper:
+        """The stepper of a proximal term, made once."""
+        while len(self._steppers) <= softer:
+            step = Newmark(2 / np.sqrt(self._softened(len(self._steppers))))
+            self._steppers.append(Stepper(self._system, step, Rayleigh()))
+        return self._steppers[softer]
+
+    def _iterate(self, trial: State, lanes: Lanes, moving: np.ndarray, softer: int) -> tuple[Floats, np.ndarray]:
         """One proximal step of the lanes that move, their slip as it was; norm of eta M (u⁺ - u), and where it failed."""
         following, rest = self._next, np.zeros((2, LANES))
         for mine, theirs in zip((*following.motion, *following.contact), (*trial.motion, *trial.contact), strict=True):
             mine[:] = theirs
         failed = np.zeros(LANES, dtype=bool)
-        failed[list(self._stepper.attempt(following, lanes, rest, rest))] = True
+        failed[list(self._stepper(softer).attempt(following, lanes, rest, rest))] = True
         step = following.motion.u - trial.motion.u
         trial.motion.u[:, moving] = following.motion.u[:, moving]
         for lane in np.flatnonzero(moving[: lanes.n_lane]).tolist():
             take_solution(trial.contact, following.contact, lane)
         product(self._M, step, self._inertia)
-        return self.eta * np.linalg.norm(self._inertia, axis=0), failed
+        return self._softened(softer) * np.linalg.norm(self._inertia, axis=0), failed

@@ -3,8 +3,21 @@
 import numpy as np
 import pytest
 
-from engine import LANES, Constraints, JointMaterial, Lanes, Material, System, build_system, equilibrium, natural_frequencies
+from engine import (
+    LANES,
+    Constraints,
+    JointMaterial,
+    Lanes,
+    Material,
+    Spec,
+    System,
+    build_model,
+    build_system,
+    equilibrium,
+    natural_frequencies,
+)
 from engine.kernels.joint import OPEN, STICK, respond
+from engine.spec import Box, Domain, Gravity, Layer, MeshOptions, Pressure, Supports
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +135,26 @@ def test_box_hangs_against_its_roof_under_the_pressure_of_the_source(paper_model
     box = spec.box.density * spec.gravity.acceleration * system.mesh.areas()[structure].sum()
     uplift = spec.pressure.p0 / spec.pressure.reference_height * spec.box.width * spec.box.height
     assert force == pytest.approx(uplift - box, rel=1e-9)  # (D10)'s 1e-10 of a load twice as large
+
+
+def test_a_box_that_slides_under_a_roof_of_little_friction_is_followed_until_it_lies_still():
+    """Lifted against the ground by water, without weight: only the last of the friction stops it, after tens of thousands of even
+    steps of the first proximal term. It was said that nothing holds it."""
+    mesh = MeshOptions(
+        order=1, wall_elements=1, roof_elements=2, side_elements=2, corner_levels=0, first=3, largest_width=5, largest_height=5
+    )
+    spec = Spec(
+        mesh=mesh,
+        domain=Domain(width=9, depth=14),
+        box=Box(width=5, height=2, wall=0.15, depth=3, offset=0.4, E=8e9, nu=0.0),
+        layer=(Layer(bottom=20, E=2e9, nu=0.1, density=2000, friction=0.02),),
+        pressure=Pressure(p0=1e4),
+        supports=Supports(sides="roller"),
+        gravity=Gravity(self_weight=False),
+    )
+    model = build_model(spec)
+    load = model.pressure(spec)
+    lanes = Lanes.of([load], [model.system.joint_law()], [np.zeros((1, 2))])
+    state, found = equilibrium(model.system, lanes, [lanes.standing], model.frequencies[0])
+    assert found[0]
+    assert_in_equilibrium(model.system, state, 0, load)
