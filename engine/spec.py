@@ -321,11 +321,16 @@ def _conflicts(spec: Spec) -> Any:
     for i, (above, below) in enumerate(pairwise(bottoms)):
         if below <= above:
             yield f"layer.{i + 2}.bottom = {below:g} m: must lie below the layer above it, which ends at {above:g} m"
-    mesh = spec.mesh
-    columns = _about(mesh, mesh.largest_width, domain.width) + mesh.roof_elements + 2 * mesh.wall_elements
-    rows = _about(mesh, mesh.largest_height, domain.depth) + mesh.side_elements + 2 * mesh.wall_elements
-    if columns * rows > MOST_CELLS:
-        yield f"mesh.first = {mesh.first:g} m: makes about {columns * rows:.2g} cells of the mesh; must be at most {MOST_CELLS:,}"
+    mesh, damping = spec.mesh, spec.damping
+    own = domain.width, domain.depth
+    reference = damping.reference_width or domain.width, damping.reference_depth or domain.depth
+    for width, depth in dict.fromkeys((own, reference)):
+        columns = _about(mesh, mesh.largest_width, width) + mesh.roof_elements + 2 * mesh.wall_elements
+        rows = _about(mesh, mesh.largest_height, depth) + mesh.side_elements + 2 * mesh.wall_elements
+        if columns * rows > MOST_CELLS:
+            of = "" if (width, depth) == own else f" of the damping's domain of {width:g} m x {depth:g} m"
+            cells = f"{columns * rows:.2g} cells of the mesh{of}"
+            yield f"mesh.first = {mesh.first:g} m: makes about {cells}; must be at most {MOST_CELLS:,}"
     if time.duration < time.dt:
         yield f"time.duration = {time.duration:g} s: must be at least one time.dt = {time.dt:g} s"
     elif time.duration / time.dt > 2e6:

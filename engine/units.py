@@ -12,6 +12,9 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?
 _NO_UNIT = re.compile(r"[\d)]\s*(\*\*|\^)|\d{3}")
 """Powers of numbers and of brackets, long numbers: sums to be worked out, not units."""
 
+SIZES = (1e-30, 1e30)
+"""What a number but zero may be in SI: their squares and their products with others stay far from where floats end."""
+
 _MEANT = {
     ("g", "m/s**2"): " (the gram); the standard gravity is g_0",
     ("gal", "m/s**2"): " (the gallon); the unit of gravimetry is Gal",
@@ -88,6 +91,8 @@ def in_si(value: Any, unit: str, unit_required: bool) -> float:
         number *= _factor(written, "dimensionless" if unit == "1" else unit)
     if not math.isfinite(number):
         raise ValueError("must be finite")
+    if number != 0.0 and not SIZES[0] <= abs(number) <= SIZES[1]:
+        raise ValueError(f"must be zero or of a size from {SIZES[0]:g} to {SIZES[1]:g}{'' if unit == '1' else ' ' + unit}")
     if written:
         return number
     if unit_required and unit != "1" and number != 0.0:

@@ -272,6 +272,14 @@ FILES = [
     bad("two signs", '[box]\nE = "--1 Pa"', ("box.E", '"--1 Pa"', 'must be a number and a unit, as in "2.5 Pa"')),
     bad("empty quantity", '[box]\nE = ""', ("box.E", '""', "must be a number and a unit")),
     bad("temperature", '[box]\nE = "5 degC"', ("box.E", '"5 degC"', "must be a quantity in Pa")),
+    bad("too large for its square", '[pressure]\np0 = "1e31 Pa"', ("pressure.p0", '"1e31 Pa"', "from 1e-30 to 1e+30 Pa")),
+    bad("denormal", '[box]\nwall = "1e-310 m"', ("box.wall", '"1e-310 m"', "zero or of a size from 1e-30")),
+    bad("too small, of no unit", "[motion]\nscale = 1e-40", ("motion.scale", "1e-40", "from 1e-30 to 1e+30")),
+    bad(
+        "damping of a domain beyond all meshes",  # it was meshed, for ever
+        '[damping]\nreference_width = "1e9 m"',
+        ("mesh.first", "1 m", "of the damping's domain of 1e+09 m x 14 m; must be at most 500,000"),
+    ),
     bad("too large in SI", '[box]\nE = "1e308 GPa"', ("box.E", '"1e308 GPa"', "must be finite")),
     bad("angular frequency", '[ricker]\nfrequency = "5 rad/s"', ("ricker.frequency", '"5 rad/s"', "divide by 2 pi")),
     bad("percent without its sign", '[damping]\nratio = "5"', ("damping.ratio", '"5"', "must be less than 1")),
@@ -577,11 +585,11 @@ FILES = [
     ),
     bad(
         "sizes beyond all meshes",
-        '[domain_size]\nwidth = { from = "10 m", num = 50, factor = 4 }',
+        '[domain_size]\nwidth = { from = "10 m", num = 49, factor = 4 }',
         ("domain_size", "mesh.first", "7.1e+05 cells"),
         ("domain_size", "mesh.first", "2.8e+06 cells"),
         ("domain_size", "mesh.first", "1.1e+07 cells"),
-        ("domain_size", "mesh.first", "40 more like this"),
+        ("domain_size", "mesh.first", "39 more like this"),
     ),
 ]
 
