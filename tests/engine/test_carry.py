@@ -145,5 +145,5 @@ def test_free_field_tells_its_displacement_at_the_record_s_depth():
 
 
 def test_a_transfer_of_nothing_at_all_counts_as_the_water_level():
-    """Without damping the scheme lets nothing through at half the sampling rate, in some columns to the last bit; 0/0 was a NaN."""
+    """Without damping the scheme lets nothing through at half the sampling rate, exactly so in some columns; it was 0/0."""
     np.testing.assert_allclose(_at_least(0.1, np.array([0.0, -1e-3j, 0.1, -2.0])), [0.1, -0.1j, 0.1, -2.0], rtol=1e-15)

@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 from engine import compile_kernels
-from tests.fuzz.examine import LOST, Depth, Examined, examine, largest, summed
+from tests.fuzz.examine import FIGURES, LOST, Depth, Examined, examine, largest, summed
 from tests.fuzz.models import as_toml, draw
 
 FOLDER = Path("results/fuzz")
@@ -85,7 +85,7 @@ def _tell(console: Console, examined: list[Examined], seconds: float) -> int:
     console.print(shown)
     for way, count in sorted(sum((each.told for each in examined), Counter()).items()):
         console.print(f"{count:>7,}  {way}")
-    for name in ("residual", "energy_error", "contact_drift", "iterations"):
+    for name in FIGURES:
         value, number = largest(examined, name)
         console.print(f"largest {name}: {value:.2g}, model {number}")
     slowest = max(examined, key=lambda each: each.seconds)

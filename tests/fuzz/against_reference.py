@@ -7,6 +7,7 @@ import numpy as np
 
 from engine import Lanes, Model, Spec, State, Stepper, equilibrium, newmark_of
 from tests import reference
+from tests.fuzz.checks import SOLVING, UNIT
 from tests.twin import STEP, Twin, lanes_of, moment, reference_step, step_error, twin_of_model
 
 
@@ -23,8 +24,6 @@ Told = namedtuple("Told", "where verdict detail")
 Around = namedtuple("Around", "before after ground lane halved missed")
 """A lane's moments before and after a step, base acceleration at both, whether it was halved, by how much [m] its gaps are
 missed."""
-
-UNIT = 2.0**-53
 
 
 def told_steps(model: Model, specs: list[Spec], motions: list[np.ndarray], instants: tuple[int, ...]) -> list[Told]:
@@ -81,7 +80,7 @@ def _verdict(model: Model, twin: Twin, lanes: Lanes, spec: Spec, around: Around)
 def _rounding(model: Model, twin: Twin, step: tuple, around: Around) -> float:
     """Largest error of u, relative to the largest u, that rounding of the equations' own terms may cause.
 
-    A row of n terms is known to n units of the sum of its magnitudes, joints by the residual of their solve as well; what that
+    A row of n terms is known to 4 n units of the sum of its magnitudes, joints by the residual of their solve as well; what that
     does to u is |J⁻¹| times it (Skeel), J being the matrix in the states found.
     """
     joints, before, standing, ground = step
@@ -92,7 +91,7 @@ def _rounding(model: Model, twin: Twin, step: tuple, around: Around) -> float:
     of = reference.newmark_equation(*arguments, **scheme)
     D, B = abs(of.joints.tangent(around.after.state)), abs(of.joints.B)
     gap = (B @ abs(u)).reshape(-1, 2) + np.outer(abs(before.slip), [0, 1])
-    units = UNIT * (np.diff(of.A.indptr).max() + np.diff(of.joints.B.indptr).max())
+    units = SOLVING * UNIT * (np.diff(of.A.indptr).max() + np.diff(of.joints.B.indptr).max())
     uncertain = np.einsum("pij,pj->pi", D, units * gap + around.missed)
     error = units * (abs(of.A) @ abs(u) + abs(of.load)) + B.T @ uncertain.ravel()
     inverse = abs(np.linalg.inv(of.joints.matrix(of.A, around.after.state).toarray()))
