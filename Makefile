@@ -9,15 +9,18 @@ NO_VENV = import sys; print('$(PYTHON) has no venv module; on Debian and Ubuntu:
 BIN := $(if $(filter Windows_NT,$(OS)),.venv/Scripts,.venv/bin)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 STUDY ?=
+N ?= 1000
+SEED ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help install study test verify figures versus bench bench-large torture check check-platforms clean
+.PHONY: help install study test verify fuzz figures versus bench bench-large torture check check-platforms clean
 
 help: ## list the targets
 	@echo "make study              run all named studies, from nothing; results and figures in results/"
 	@echo "make study STUDY=p0     run one of them, or a study file"
 	@echo "make test               run the tests"
 	@echo "make verify             run the verification cases alone, with their names"
+	@echo "make fuzz N=10000       attack the engine with random models (SEED=1); what it finds goes to results/fuzz"
 	@echo "make figures            draw the figures of docs/ anew, some minutes"
 	@echo "make versus             OpenSees and coralquake on the same model, one figure: results/versus.png"
 	@echo "make bench              all timings, beside OpenSees where it can be installed; some minutes; results/bench.json"
@@ -58,6 +61,9 @@ test: .venv/tools
 
 verify: .venv/tools
 	$(BIN)/python -m pytest tests/verification --verbose
+
+fuzz: .venv/tools
+	$(BIN)/python -m tests.fuzz --number $(N) --seed $(SEED)
 
 figures: .venv/installed
 	$(BIN)/python docs/signs.py

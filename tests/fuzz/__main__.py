@@ -12,6 +12,7 @@ import argparse
 import faulthandler
 import sys
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 
@@ -48,15 +49,16 @@ def main() -> int:
     compile_kernels()
     start, examined = perf_counter(), []
     numbers = range(arguments.number) if only is None else [only]
-    for number in track(numbers, "models", console=Console(stderr=True)):
-        faulthandler.dump_traceback_later(MOST_SECONDS, exit=True)
-        drawn = draw(arguments.seed, number)
-        if only is not None:
-            print(as_toml(drawn.table))
-        examined.append(examine(drawn, depth_of(number) if only is None else Depth(True, True, True)))
-        faulthandler.cancel_dump_traceback_later()
-        for line in examined[-1].findings:
-            console.print(f"model {number}: {line}; coralquake run {_written(examined[-1])}", markup=False, soft_wrap=True)
+    with suppress(KeyboardInterrupt):  # then what was done until then is told
+        for number in track(numbers, "models", console=Console(stderr=True)):
+            faulthandler.dump_traceback_later(MOST_SECONDS, exit=True)
+            drawn = draw(arguments.seed, number)
+            if only is not None:
+                print(as_toml(drawn.table))
+            examined.append(examine(drawn, depth_of(number) if only is None else Depth(True, True, True)))
+            for line in examined[-1].findings:
+                console.print(f"model {number}: {line}; coralquake run {_written(examined[-1])}", markup=False, soft_wrap=True)
+    faulthandler.cancel_dump_traceback_later()
     return _tell(console, examined, perf_counter() - start)
 
 

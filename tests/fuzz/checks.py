@@ -1,5 +1,6 @@
 """What every finished study must keep, whatever was asked: finite where it is done, empty where it failed, balanced."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,14 +110,14 @@ def bounds(model: Model, specs: list[Spec], motions: list[np.ndarray]) -> Bounds
     return Bounds(worst[:n], (lost / np.where(scale > 0, scale, 1))[:n])
 
 
-def imbalances(study: Study, ds: xr.Dataset, model: Model) -> list[str]:
+def imbalances(study: Study, ds: xr.Dataset, model: Callable[[], Model]) -> list[str]:
     """Residuals and energy errors of the cases that are done and lie beyond D9 and D11, and beyond what rounding explains."""
     residual, energy = ds.residual.values.ravel(), ds.energy_error.values.ravel()
     closes = study.cases[0].time.newmark_gamma == 0.5
     beyond = [c for c in study.scaling.solved if residual[c] > RESIDUAL or (closes and energy[c] > ENERGY)]
     if not beyond:
         return []
-    limit = bounds(model, [study.cases[c] for c in beyond], [study.ground(c) for c in beyond])
+    limit = bounds(model(), [study.cases[c] for c in beyond], [study.ground(c) for c in beyond])
     found = []
     for case, of_residual, of_energy in zip(beyond, limit.residual, limit.energy, strict=True):
         if residual[case] > max(RESIDUAL, of_residual):

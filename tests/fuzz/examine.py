@@ -1,8 +1,9 @@
 """One random model through the real entry point, a study table, and all that is then asked of it."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -75,31 +76,31 @@ def examine(drawn: Drawn, depth: Depth) -> Examined:
 
 
 def _ask(found: Examined, study: Study, ds: xr.Dataset, depth: Depth) -> None:
-    model = build_model(study.cases[0])
+    model = cache(lambda: build_model(study.cases[0]))  # few need it again
     found.findings += emptiness(ds) + imbalances(study, ds, model)
     for name in FIGURES if study.cases[0].time.newmark_gamma == 0.5 else FIGURES[:2]:
         values = ds[name].values[np.isfinite(ds[name].values)]
         found.worst[name] = float(values.max(initial=0.0))
     for spec, status in zip(study.cases, statuses(ds), strict=True):
         found.ended[_how(model, spec, status, found)] += 1
-    if depth.reference and model.system.n_dof <= LARGEST_FOR_REFERENCE:
-        _ask_reference(found, study, model)
-    if depth.relations and model.system.n_dof <= LARGEST_FOR_RELATIONS:
-        _ask_relations(found, study, model)
+    if depth.reference and model().system.n_dof <= LARGEST_FOR_REFERENCE:
+        _ask_reference(found, study, model())
+    if depth.relations and model().system.n_dof <= LARGEST_FOR_RELATIONS:
+        _ask_relations(found, study, model())
     if depth.reordered:
         found.findings += reordered(found.drawn.table, study, ds) + own_rate(study)
         found.told["lanes in another order, record at its own rate"] += 1
 
 
-def _how(model: Model, spec: Spec, status: Status, found: Examined) -> str:
+def _how(model: Callable[[], Model], spec: Spec, status: Status, found: Examined) -> str:
     """How a case ended; where no equilibrium was found, whether there is none."""
     if status != Status.NO_EQUILIBRIUM:
         return status.name.lower()
-    if held(model, spec, friction=False):
+    if held(model(), spec, friction=False):
         found.findings.append(
             f"p0 = {spec.pressure.p0:g} Pa: no equilibrium found, although the joint holds the box without friction"
         )
-    return HELD_BY_FRICTION if held(model, spec, friction=True) else "no equilibrium, which is proved"
+    return HELD_BY_FRICTION if held(model(), spec, friction=True) else "no equilibrium, which is proved"
 
 
 def _ask_reference(found: Examined, study: Study, model: Model) -> None:

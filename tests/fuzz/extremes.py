@@ -25,7 +25,7 @@ SMALL: Table = {
 }
 """A hundred degrees of freedom and ten steps."""
 
-VALUES = (0.0, 5e-324, 1e-308, 1e-160, 1e-30, 1e-9, 1e9, 1e30, 1e160, 1.7e308)
+VALUES = (0.0, 5e-324, 1e-160, 1e-30, 1e9, 1e30, 1.7e308)
 LAYER = {"bottom": "14 m", "E": "1e9 Pa", "nu": 0.2, "density": "2000 kg/m**3", "friction": 0.4}
 
 

@@ -10,7 +10,8 @@ Table = dict[str, Any]
 Generator = np.random.Generator
 
 GRAVITY = 9.81
-MOST_STEPS = 120
+MOST_STEPS, FEW_STEPS = 120, 40
+COARSEST = {"wall_elements": 1, "roof_elements": 2, "side_elements": 2, "corner_levels": 0}
 CORAL_RECORDS = ("ridgecrest-2019-clc-360.AT2", "ridgecrest-2019-clc-up.AT2")
 
 
@@ -24,8 +25,11 @@ class Drawn:
     features: tuple[str, ...]
 
 
-def draw(seed: int, number: int) -> Drawn:
-    """Model `number` of a seed; its cases share mesh and time step, so that they march side by side."""
+def draw(seed: int, number: int, small: bool = False) -> Drawn:
+    """Model `number` of a seed; its cases share mesh and time step, so that they march side by side.
+
+    small : on the coarsest meshes there are, and not for long
+    """
     rng = np.random.default_rng([seed, number])
     features: list[str] = []
     box, domain = _places(rng, features)
@@ -34,13 +38,13 @@ def draw(seed: int, number: int) -> Drawn:
     sides = str(rng.choice(["tied", "shear", "roller", "fixed"]))
     weight = sides != "shear" and bool(rng.integers(2))
     features += [f"sides {sides}", "self-weight" if weight else "no self-weight"]
-    time = _time(rng, features)
+    time = _time(rng, FEW_STEPS if small else MOST_STEPS, features)
     table: Table = {
         "box": box,
         "domain": domain,
         "layer": _layers(rng, box, domain, features),
         "joint": _joint(rng, order, features),
-        "mesh": _mesh(rng, order, box),
+        "mesh": _mesh(rng, order, box) | (COARSEST if small else {}),
         "supports": {"sides": sides},
         "gravity": {"self_weight": weight},
         "damping": _damping(rng, features),
@@ -146,10 +150,10 @@ def _damping(rng: Generator, features: list[str]) -> Table:
     return damping
 
 
-def _time(rng: Generator, features: list[str]) -> Table:
+def _time(rng: Generator, most: int, features: list[str]) -> Table:
     """Steps of 1e-4 to 0.05 s, of three digits, so that records can be brought to them."""
     dt = float(f"{_log(rng, -4, np.log10(0.05)):.2e}")
-    n = 1 if _chance(rng, 0.02) else int(rng.integers(20, MOST_STEPS + 1))
+    n = 1 if _chance(rng, 0.02) else int(rng.integers(20, most + 1))
     features += [f"dt 1e{int(np.floor(np.log10(dt)))} s", *(["one step"] if n == 1 else [])]
     time = {"dt": dt, "duration": float(f"{n * dt:.6e}")}
     if _chance(rng, 0.1):
