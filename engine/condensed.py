@@ -40,10 +40,17 @@ def solve(factor: Factor, x: Floats) -> Floats:
     return x
 
 
-def dashpots(slope: Floats, offset: Floats, T: Floats | None = None, G: Floats | None = None) -> Dashpots:
-    """Dashpots of a step (D5), lane first: force = slope g + offset (LANES, m); T = (I + G slope)⁻¹ and T G where any act."""
-    none = np.zeros((0, *2 * (slope.shape[1],)))
-    return Dashpots(slope, offset, none if T is None else T, none if G is None else G)
+def no_dashpots(m: int) -> Dashpots:
+    """None in m joint degrees of freedom."""
+    return Dashpots(np.zeros((LANES, m)), *np.zeros((2, 0, m, m)))
+
+
+def eliminated(slope: Floats, G: Floats) -> tuple[Floats, Floats]:
+    """P and the flexibility that is left, both (m, m), for dashpots with slopes (m,); see Dashpots."""
+    root = np.sqrt(slope)
+    P = np.outer(root, root) * np.linalg.inv(np.eye(len(G)) + np.outer(root, root) * G)
+    left = G - G @ P @ G
+    return P, 0.5 * (left + left.T)
 
 
 class Condensed:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from .assembly import System, rows
-from .condensed import MAX_ROUNDS, Condensed, dashpots, factorise, solve
+from .condensed import MAX_ROUNDS, Condensed, eliminated, factorise, no_dashpots, solve
 from .kernels.condense import Dashpots
 from .kernels.jit import LANES
 from .kernels.joint import OPEN, STICK
@@ -81,7 +81,7 @@ class Stepper:
             np.zeros((2, LANES)),
         )
         self._blind = blind(system.n_dof, len(system.points))
-        self._none = dashpots(*(np.zeros((LANES, 2 * len(system.points))) for _ in range(2)))
+        self._none = no_dashpots(2 * len(system.points))
         self._dashpots = _JointDashpots(self) if rayleigh.joints and len(system.points) else None
         self._halved: dict[int, Stepper] = {}
 
@@ -172,13 +172,13 @@ class Stepper:
 
 
 class _JointDashpots:
-    """The dashpots beta k of the joints (D5): affine in g, their states those of the start of the step, frozen within it."""
+    """The dashpots beta k of the joints (D5); which of them act is settled at the start of the step and frozen within it."""
 
     def __init__(self, stepper: Stepper) -> None:
         self._stepper = stepper
         m = 2 * len(stepper.system.points)
         self._pattern = np.full((LANES, m), -1.0)
-        self._T, self._G = np.zeros((LANES, m, m)), np.zeros((LANES, m, m))
+        self._P, self._G = np.zeros((2, LANES, m, m))
         self._rate: Floats = np.zeros((m, LANES))
 
     def at(self, state: State, lanes: Lanes) -> Dashpots:
@@ -189,15 +189,13 @@ class _JointDashpots:
         product(self._stepper.condensed.of.B, rates.a4 * motion.v + rates.a5 * motion.a, self._rate)
         slope = rates.a1 * c
         self._eliminate(slope, lanes.n_lane)
-        return dashpots(slope, -c * (rates.a1 * contact.gap + self._rate.T), self._T, self._G)
+        return Dashpots(contact.gap + self._rate.T / rates.a1, self._P, self._G)
 
     def _eliminate(self, slope: Floats, n_lane: int) -> None:
-        """T and T G of the lanes whose dashpots have changed."""
+        """P and G of the lanes whose dashpots have changed."""
         G = self._stepper.condensed.G[0]
         for lane in np.flatnonzero((slope != self._pattern).any(axis=1)).tolist():
             if lane < n_lane:
-                self._T[lane] = np.linalg.inv(np.eye(len(G)) + G * slope[lane])
-                flexibility = self._T[lane] @ G
-                self._G[lane] = 0.5 * (flexibility + flexibility.T)
+                self._P[lane], self._G[lane] = eliminated(slope[lane], G)
                 self._pattern[lane] = slope[lane]
                 self._stepper.condensed.forget(lane)

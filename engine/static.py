@@ -75,8 +75,7 @@ class _Proximal:
             lost |= moving & failed
             moving &= ~(failed | (change <= TOLERANCE * scale))
         state.motion.u[:, active] = trial.motion.u[:, active]
-        none = np.zeros_like(state.contact.gap)
-        commit_joints(lanes.law, none, none, lanes.n_lane, trial.contact, state.contact, state.energy)
+        commit_joints(lanes.law, lanes.n_lane, trial.contact, state.contact, state.energy)
         return ~(lost | moving)
 
     def _softened(self, times: int) -> float:

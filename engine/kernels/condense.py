@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .blocks import dot, multiplied
 from .clock import ticks
 from .contact import solve_lane, source_test
 from .jit import LANES, inlined_kernel, kernel
@@ -33,14 +34,16 @@ class Condensation(NamedTuple):
 
 
 class Dashpots(NamedTuple):
-    """Dashpots of a step (D5), lane first: force = slope g + offset (LANES, m); T = (I + G slope)⁻¹ and T G, (LANES, m, m).
+    """Dashpots of the joints in a step (D5), lane first: their force is S (g - reference) with S diagonal.
 
-    Where damping leaves the joints out, slope and offset are zero and there is no T.
+    reference : (LANES, m) gaps at which they carry nothing
+    P : (LANES, m, m) S^½ (I + S^½ G S^½)⁻¹ S^½: eliminated from g + G (lambda + S (g - reference)) = g_free, their force is
+    P (g_free - G lambda - reference), in which no large numbers cancel; none, (0, m, m), where damping leaves the joints out
+    G : G - G P G, the flexibility that is left
     """
 
-    slope: np.ndarray
-    offset: np.ndarray
-    T: np.ndarray
+    reference: np.ndarray
+    P: np.ndarray
     G: np.ndarray
 
 
@@ -79,21 +82,27 @@ def solve_joints(G, gap_free, law, n_lane, max_rounds, work, slip, found, report
 
 @kernel
 def take_solution(into, source, lane):
-    """Copy what a joint solve finds (gap, force, state) of one lane."""
+    """Copy what a joint solve finds (gap, forces, state) of one lane."""
     into.gap[lane], into.force[lane], into.state[lane] = source.gap[lane], source.force[lane], source.state[lane]
+    into.damped[lane] = source.damped[lane]
 
 
 @kernel
-def _through_dashpots(T, G, offset, x, gap):
-    """Gaps T (gap - G offset) of one lane with its dashpots eliminated; x (m,) is scratch."""
+def _through_dashpots(G, P, reference, gap, stretch, x):
+    """gap (m,) of one lane less what its dashpots take off it, and their stretch gap - reference without them; x is scratch."""
     for i in range(x.shape[0]):
-        x[i] = gap[i]
-        for j in range(x.shape[0]):
-            x[i] -= G[i, j] * offset[j]
+        stretch[i] = gap[i] - reference[i]
+    multiplied(P, x.shape[0], stretch, x)
     for i in range(x.shape[0]):
-        gap[i] = 0.0
-        for j in range(x.shape[0]):
-            gap[i] += T[i, j] * x[j]
+        gap[i] -= dot(G[i], x, x.shape[0])
+
+
+@kernel
+def _dashpot_force(G, P, force, stretch, x):
+    """Turn the stretch (m,) of one lane's dashpots into their force: P (stretch - G force); x is scratch."""
+    for i in range(x.shape[0]):
+        x[i] = stretch[i] - dot(G[i], force, x.shape[0])
+    multiplied(P, x.shape[0], x, stretch)
 
 
 @inlined_kernel
@@ -101,7 +110,8 @@ def solve(of, law, n_lane, max_rounds, dashpots, before, found, report, y, clock
     """Solve matrix y + B_jᵀ (lambda(B_j y + known gap) + dashpots) = y in place for all lanes; True where any lane failed.
 
     The known part of the displacement stands in of.tail for the joints' degrees of freedom.
-    before : joint state the solve starts from; a lane that fails is given its forces. found : receives the solution
+    before : joint state the solve starts from; a lane that fails is given its forces. found : receives the solution, the force of
+    the dashpots too
     """
     began = ticks()
     start = of.factor.n_interior
@@ -131,11 +141,11 @@ def solve(of, law, n_lane, max_rounds, dashpots, before, found, report, y, clock
 @inlined_kernel
 def _joints(of, law, n_lane, max_rounds, dashpots, before, found, report):
     """Joint solve for the gaps in of.gap, which receives the joints' forces (m, LANES); True where any lane failed."""
-    damped, work = dashpots.T.shape[0] > 0, of.work
+    damped, work = dashpots.P.shape[0] > 0, of.work
     for lane in range(n_lane):
         take_solution(found, before, lane)
         if damped:
-            _through_dashpots(dashpots.T[lane], of.G[0], dashpots.offset[lane], work.free, of.gap[:, lane])
+            _through_dashpots(of.G[0], dashpots.P[lane], dashpots.reference[lane], of.gap[:, lane], found.damped[lane], work.free)
     G = dashpots.G if damped else of.G
     solve_joints(G, of.gap, law, n_lane, max_rounds, work, before.slip, found, report)
     any_failed = False
@@ -143,9 +153,10 @@ def _joints(of, law, n_lane, max_rounds, dashpots, before, found, report):
         if report.rounds[lane] < 0:
             any_failed = True
             take_solution(found, before, lane)
+        elif damped:
+            _dashpot_force(of.G[0], dashpots.P[lane], found.force[lane], found.damped[lane], work.free)
         for i in range(of.gap.shape[0]):
-            force = found.force[lane, i]
-            of.gap[i, lane] = force + dashpots.slope[lane, i] * found.gap[lane, i] + dashpots.offset[lane, i] if damped else force
+            of.gap[i, lane] = found.force[lane, i] + found.damped[lane, i]
     for lane in range(n_lane, LANES):
         of.gap[:, lane] = 0.0
     return any_failed

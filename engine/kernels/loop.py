@@ -129,14 +129,14 @@ def solve_step(of, drive, ground, dashpots, motion, contact):
 
 
 @inlined_kernel
-def commit_step(of, drive, ground, ground_end, dashpots, motion, contact, energy):
+def commit_step(of, drive, ground, ground_end, motion, contact, energy):
     """Advance all lanes to the end of the step just solved; base acceleration (2, LANES) at both ends."""
     began = ticks()
     for i in range(2):
         for c in range(LANES):
             of.mean_ground[i, c] = 0.5 * (ground[i, c] + ground_end[i, c])
     commit(of.rates, of.matrices, drive.loads, of.mean_ground, motion, of.step, energy)
-    commit_joints(drive.law, dashpots.slope, dashpots.offset, drive.n_lane, of.found, contact, energy)
+    commit_joints(drive.law, drive.n_lane, of.found, contact, energy)
     of.clock[COMMIT] += ticks() - began
 
 
@@ -195,7 +195,7 @@ def march(first, stage, end, of, drive, dashpots, watches, motion, contact, acco
         if stage == TO_COMMIT:
             stage = TO_WATCH
             before, after = drive.ground[step - 1], drive.ground[step]
-            commit_step(of, drive, before, after, dashpots, motion, contact, account.energy)
+            commit_step(of, drive, before, after, motion, contact, account.energy)
             if _any_lost(of.report, account.energy, drive.n_lane):
                 return step, stage
         _conclude(step, of, drive, watches, motion, contact, account)

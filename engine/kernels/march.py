@@ -156,18 +156,14 @@ def _advance(rates, loads, ground, motion, step, energy):
 
 
 @kernel
-def commit_joints(law, slope, offset, n_lane, found, contact, energy):
-    """Make the solution `found` the state of the lanes, with its slip, and account for the work done (D11).
-
-    The dashpots' force is slope g + offset, both (LANES, 2 n_point) and zero where damping leaves the joints out (D5).
-    """
+def commit_joints(law, n_lane, found, contact, energy):
+    """Make the solution `found` the state of the lanes, with its slip, and account for the work done (D11)."""
     for lane in range(n_lane):
         elastic = 0.0
         for i in range(contact.gap.shape[1]):
             p, tangential = i // 2, i % 2 == 1
-            gap, force = found.gap[lane, i], found.force[lane, i]
+            gap, force, damped = found.gap[lane, i], found.force[lane, i], found.damped[lane, i]
             step = gap - contact.gap[lane, i]
-            damped = slope[lane, i] * gap + offset[lane, i]
             elastic += 0.5 * force**2 / (law.k_s[lane, p] if tangential else law.k_n[lane, p])
             if tangential:
                 slip = slip_after(found.state[lane, p], gap, force, contact.slip[lane, p], law.k_s[lane, p])

@@ -16,6 +16,6 @@ def marched_by_hand(stepper: Stepper, lanes: Lanes) -> list[State]:
     for before, after in pairwise(lanes.ground):
         pots = stepper.dashpots(state, lanes)
         assert not solve_step(stepper.of, drive, after, pots, state.motion, state.contact)
-        commit_step(stepper.of, drive, before, after, pots, state.motion, state.contact, state.energy)
+        commit_step(stepper.of, drive, before, after, state.motion, state.contact, state.energy)
         states.append(state.copy())
     return states

@@ -350,7 +350,7 @@ def test_lane_that_no_joint_solve_can_serve_is_halved_alone(system, lanes):
     assert list(before) == [2]
     np.testing.assert_array_equal(before[2].motion.u[:, 0], state.motion.u[:, 2])
     assert np.isnan(spoilt.of.report.residual[2])
-    commit_step(spoilt.of, drive, lanes.ground[3], lanes.ground[4], pots, state.motion, state.contact, state.energy)
+    commit_step(spoilt.of, drive, lanes.ground[3], lanes.ground[4], state.motion, state.contact, state.energy)
     assert not np.isfinite(state.motion.u[:, 2]).all()
     assert spoilt.in_halves(state, 2, before[2], lanes, lanes.ground[3], lanes.ground[4])
     plain.step(expected, lanes, lanes.ground[3], lanes.ground[4])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from engine.condensed import dashpots, factorise
+from engine.condensed import factorise, no_dashpots
 from engine.kernels import clock, condense
 from engine.kernels.condense import JOINTS, PHASES, SWEEPS, Condensation, Found
 from engine.kernels.direct import EQUATION_TOLERANCE
@@ -88,10 +88,10 @@ def condensation(matrix, B):
 
 def solved(condensation, law_, rhs, before, known=None, max_rounds=26):
     """Whether any lane failed, what was found, the report, y and the clock; `known` is the known part of the displacement."""
-    m, y, ticks = 2 * N_POINT, rhs.copy(), np.zeros(len(PHASES), dtype=np.int64)
+    y, ticks = rhs.copy(), np.zeros(len(PHASES), dtype=np.int64)
     found, report = nothing(), Found(np.zeros(LANES, dtype=np.int64), *np.zeros((2, LANES)))
     condensation.tail[:] = 0.0 if known is None else known
-    none = dashpots(*np.zeros((2, LANES, m)))
+    none = no_dashpots(2 * N_POINT)
     any_failed = condense.solve(condensation, law_, N_LANE, max_rounds, none, before, found, report, y, ticks)
     return any_failed, found, report, y, ticks
 
@@ -174,14 +174,14 @@ def test_clock_counts_sweeps_and_joint_solves_alone(rng, condensation):
 
 
 def test_take_solution_copies_what_a_joint_solve_finds(rng):
-    """Gap, force and state of one lane; slip, dashpots and work are no part of it."""
+    """Gap, forces and state of one lane; slip and work are no part of it."""
     into, source = nothing(), nothing()
     for x in source:
         x[...] = rng.integers(1, 4, x.shape)
     condense.take_solution(into, source, 2)
-    for name in ("gap", "force", "state"):
+    for name in ("gap", "force", "damped", "state"):
         found = getattr(into, name)
         np.testing.assert_array_equal(found[2], getattr(source, name)[2])
         assert not np.delete(found, 2, axis=0).any()
-    for name in ("damped", "slip", "work"):
+    for name in ("slip", "work"):
         assert not getattr(into, name).any()

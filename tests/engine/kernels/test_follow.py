@@ -8,7 +8,7 @@ import pytest
 
 from engine.kernels.contact import STATE_TOLERANCE, _revise
 from engine.kernels.direct import EQUATION_TOLERANCE, direct
-from engine.kernels.follow import WITHIN, follow_from_afar, follow_on
+from engine.kernels.follow import WITHIN, follow
 from engine.kernels.joint import OPEN
 from engine.kernels.states import Points, workspace
 
@@ -34,12 +34,12 @@ def newton_cycles(p):
     return True
 
 
-def followed(follow, p, start):
+def followed(near, p, start):
     """Whether the path arrives; gaps, forces, states at its end, solved for as `solve_lane` does; g_free at its start."""
     work, state = workspace(len(p.k_n), 1), p.state.copy()
     kept, (g, lam) = kept_of_lane(work), np.zeros((2, len(p.free)))
     work.start[:] = start
-    arrived = follow(points_of(p), kept, work, p.free, state, g, lam)
+    arrived = follow(points_of(p), kept, work, p.free, near, state, g, lam)
     residual, _ = direct(points_of(p), kept, p.free, state, g, lam)
     assert not arrived or residual <= EQUATION_TOLERANCE
     return arrived, g, lam, state, work.far
@@ -60,10 +60,10 @@ def test_path_from_the_last_step_arrives_where_newton_cycles(cycling):
     """At a solution, which is the one at the end of the path from afar; where a point without friction slides to is no matter."""
     assert len(cycling) >= 5
     for p, last in cycling:
-        arrived, g, lam, state, _ = followed(follow_on, p, last)
+        arrived, g, lam, state, _ = followed(True, p, last)
         assert arrived
         assert_solved(p, g, lam, state)
-        arrived, g, lam, from_afar, _ = followed(follow_from_afar, p, np.full(len(p.free), np.nan))
+        arrived, g, lam, from_afar, _ = followed(False, p, np.full(len(p.free), np.nan))
         assert arrived
         assert_solved(p, g, lam, from_afar)
         np.testing.assert_array_equal(state == OPEN, from_afar == OPEN)
@@ -78,7 +78,7 @@ def test_path_starts_at_the_gaps_of_the_last_step(cycling):
         normal = p.k_n * np.minimum(gap[::2], 0.0)
         shear = np.clip(p.k_s * (gap[1::2] - p.slip), p.mu * normal, -p.mu * normal)
         force = np.column_stack([normal, shear]).ravel()
-        far = followed(follow_on, p, last)[-1]
+        far = followed(True, p, last)[-1]
         # rounding of the slip taken off a gap, times the stiffness, and sums of products
         error = 4 * EPS * (abs(p.slip) + abs(last[1::2]))
         close = np.max(error) * (1 + abs(p.G).sum(1).max() * p.k_s.max()) + len(far) * EPS * (abs(p.G) @ abs(force)).max()
@@ -88,4 +88,4 @@ def test_path_starts_at_the_gaps_of_the_last_step(cycling):
 def test_path_that_does_not_arrive_is_told(cycling):
     """From no number it leads nowhere."""
     p, last = cycling[0]
-    assert not followed(follow_on, p, np.nan * last)[0]
+    assert not followed(True, p, np.nan * last)[0]

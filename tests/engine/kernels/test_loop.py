@@ -119,9 +119,8 @@ class March:
     def commit(self, step: int) -> None:
         """`commit_step` of one step."""
         state, ground = self.state, self.drive.ground
-        pots = self.stepper.dashpots(state, self.lanes)
         ends = ground[step - 1], ground[step]
-        commit_step(self.stepper.of, self.drive, *ends, pots, state.motion, state.contact, state.energy)
+        commit_step(self.stepper.of, self.drive, *ends, state.motion, state.contact, state.energy)
 
     def of_lane(self, lane: int) -> Iterator[np.ndarray]:
         """Everything that belongs to a lane."""
