@@ -300,6 +300,31 @@ def _about(mesh: MeshOptions, largest: float, length: float) -> float:
     return max(graded, length / largest)
 
 
+SAME_LINE = 1e-9
+"""Of the domain's depth: lines of the mesh that lie closer together are one."""
+
+THINNEST = 1e-4
+"""Of mesh.first: thinner strips of elements are slivers, whose stiffness drowns that of all others."""
+
+
+def _slivers(spec: Spec) -> Any:
+    """Horizontal lines of the mesh that neither coincide nor leave room for elements between them."""
+    box, least = spec.box, THINNEST * spec.mesh.first
+    floor = box.depth + box.height
+    named = [(0.0, "the surface"), (spec.domain.depth, "the base")]
+    named += [(box.depth, "the top of the roof"), (box.depth + box.wall, "the underside of the roof")]
+    named += [(floor - box.wall, "the top of the floor"), (floor, "the underside of the floor")]
+    for i, layer in enumerate(spec.layer):
+        for depth, name in named:
+            off = abs(layer.bottom - depth)
+            if SAME_LINE * spec.domain.depth < off < least:
+                at = f"layer.{i + 1}.bottom = {layer.bottom!r} m"
+                yield f"{at}: lies {off:.2g} m beside {name}, at {depth:g} m; must be on it or {least:g} m or more away"
+    for what, off in (("surface", box.depth), ("base", spec.domain.depth - floor)):
+        if SAME_LINE * spec.domain.depth < off < least:
+            yield f"box.depth = {box.depth!r} m: leaves {off:.2g} m of ground to the {what}; must be {least:g} m or more"
+
+
 def _conflicts(spec: Spec) -> Any:
     """Rules between fields, each as 'field = value: rule'."""
     box, domain, time = spec.box, spec.domain, spec.time
@@ -321,6 +346,7 @@ def _conflicts(spec: Spec) -> Any:
     for i, (above, below) in enumerate(pairwise(bottoms)):
         if below <= above:
             yield f"layer.{i + 2}.bottom = {below:g} m: must lie below the layer above it, which ends at {above:g} m"
+    yield from _slivers(spec)
     mesh, damping = spec.mesh, spec.damping
     own = domain.width, domain.depth
     reference = damping.reference_width or domain.width, damping.reference_depth or domain.depth

@@ -87,10 +87,8 @@ def follow(points, kept, work, g_free, near, state, g, lam):
         if not np.isfinite(residual) or not np.isfinite(solution(points, kept, state, n_released, g_free, g, lam)):
             return False
         if moved >= 0:
-            back = SLIP_FORWARD if state[moved] == OPEN else came_from
-            forwards = _margin(points, moved, back, state[moved], g, lam) > _margin(
-                points, moved, back, state[moved], work.far_gap, work.far_force
-            )
+            before = _margin(points, moved, came_from, state[moved], work.far_gap, work.far_force)
+            forwards = _margin(points, moved, came_from, state[moved], g, lam) > before
         best, point, following = (1.0 if forwards else -np.inf), -1, OPEN
         for p in range(state.shape[0]):
             for to in _borders(state[p], points.mu[p]):

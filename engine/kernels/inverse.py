@@ -138,8 +138,6 @@ def _close_up(inverse, p):
         for q in range(2):
             for j in range(2 * last):
                 H[j, 2 * k + q] = H[j, 2 * last + q]
-            for r in range(2):
-                H[2 * k + q, 2 * k + r] = H[2 * last + q, 2 * last + r]
         inverse.point[k] = inverse.point[last]
         inverse.place[inverse.point[k]] = k
     inverse.place[p] = -1

@@ -126,6 +126,16 @@ FILES = [
         ("layer.2.bottom", "2 m", "must lie below the layer above it"),
     ),
     bad(
+        "layer that ends a hair below the roof",
+        f'[[layer]]\nbottom = "4.000001 m"\n{LAYER}[[layer]]\nbottom = "14 m"\n{LAYER}',
+        ("layer.1.bottom", "4.000001 m", "lies 1e-06 m beside the top of the roof, at 4 m; must be on it"),
+    ),
+    bad(
+        "box a hair below the surface",
+        '[box]\ndepth = "1e-6 m"',
+        ("box.depth", "1e-06 m", "leaves 1e-06 m of ground to the surface"),
+    ),
+    bad(
         "layer with a typing mistake",
         f'[[layer]]\nbotom = "4 m"\nbottom = "4 m"\n{LAYER}',
         ("layer.1.botom", '"4 m"', "did you mean layer.1.bottom?"),
