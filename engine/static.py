@@ -69,7 +69,7 @@ class _Proximal:
             if not moving.any():
                 break
             softer = min(iteration // SOFTENED_EVERY, SOFTEST)
-            if softer and iteration % SOFTENED_EVERY == 0:
+            if iteration % SOFTENED_EVERY == 0:
                 self._stepper(softer).condensed.forget(slice(None))  # or a lane's bits would tell of its companions' iterations
             change, failed = self._iterate(trial, lanes, moving, softer)
             lost |= moving & failed

@@ -271,10 +271,9 @@ class Ridden:
     def __init__(self, kind: str) -> None:
         self.turn, self.length = rotation(0.8, 0.6), 3.0
         self.system = built(one_joint(self.length, self.turn), kind, JointMaterial(400.0, 100.0, 0.5))
-        n = len(self.system.points)
         self.law = Law(*(np.tile(values, (LANES, 1)) for values in self.system.joint_law()))
         self.contact, self.found = (State.at_rest(self.system).contact for _ in range(2))
-        self.none, self.energy = np.zeros((LANES, 2 * n)), np.zeros((8, LANES))
+        self.energy = np.zeros((8, LANES))
         joint = self.system.mesh.joints[0]
         self.upper = joint[[2, 3, 5]] if len(joint) == 6 else joint[2:]
 
@@ -287,7 +286,7 @@ class Ridden:
         self.found.gap[0] = gap
         force = self.found.force[0].reshape(-1, 2)
         all_points(gap.reshape(-1, 2), slip, k_n, k_s, mu, self.found.state[0], force)
-        commit_joints(self.law, self.none, self.none, 1, self.found, self.contact, self.energy)
+        commit_joints(self.law, 1, self.found, self.contact, self.energy)
         nodal = self.system.nodal(self.system.B.T @ self.contact.force[0])[self.upper]
         tau, sigma = self.turn.T @ nodal.sum(axis=0) / self.length
         (state,) = set(self.contact.state[0].tolist())
