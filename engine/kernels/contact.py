@@ -26,10 +26,11 @@ LONG = 4  # unless they begin to be many: then this part of them, since slow one
 
 
 @kernel
-def _next_state(state, gap_n, normal, excess, forward):
-    """The state that a solution calls for: `excess` of shear over the Coulomb limit, `forward` part of the slip."""
+def _next_state(state, closing, gap_n, normal, excess, forward):
+    """The state that a solution calls for: `excess` of shear over the Coulomb limit, `forward` part of the slip; `closing` is
+    the state of a point that closes."""
     if state == OPEN:
-        return STICK if gap_n < 0.0 else OPEN
+        return closing if gap_n < 0.0 else OPEN
     if normal > 0.0:
         return OPEN
     if state == STICK and excess > 0.0:
@@ -50,7 +51,7 @@ def _revise(points, g, lam, g_tol, lam_tol, state):
             excess, forward = abs(lam[s]) + mu[p] * lam[n] - lam_tol, lam[s]
         elif state[p] != OPEN and mu[p] > 0.0:
             forward = slip_sign(state[p]) * (g[s] - lam[s] / points.k_s[p] - points.slip[p]) + g_tol
-        following = _next_state(state[p], gap_n, normal, excess, forward)
+        following = _next_state(state[p], STICK if mu[p] > 0.0 else SLIP_FORWARD, gap_n, normal, excess, forward)
         all_hold = all_hold and following == state[p]
         state[p] = np.int8(following)
     return all_hold

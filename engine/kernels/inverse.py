@@ -66,11 +66,18 @@ def scratch(m: int) -> Scratch:
 
 
 @kernel
-def _flexibility(points, inverse, i, row):
+def _flexibility(points, i, j):
+    """Gap at degree of freedom i for a unit force at j; none by shear where there is no friction, for it is never carried."""
+    frictionless = (i % 2 == 1 and points.mu[i // 2] == 0.0) or (j % 2 == 1 and points.mu[j // 2] == 0.0)
+    return 0.0 if frictionless else points.G[i, j]
+
+
+@kernel
+def _flexibilities(points, inverse, i, row):
     """Gap at degree of freedom i for a unit force at every one held, without the joint's own, into row (2 size,)."""
     for k in range(inverse.size[0]):
-        p = inverse.point[k]
-        row[2 * k], row[2 * k + 1] = points.G[i, 2 * p], points.G[i, 2 * p + 1]
+        n, s = 2 * inverse.point[k], 2 * inverse.point[k] + 1
+        row[2 * k], row[2 * k + 1] = _flexibility(points, i, n), _flexibility(points, i, s)
 
 
 @kernel
@@ -84,13 +91,13 @@ def _add(points, inverse, coming, work):
     """Take points (PAIR,) or fewer into the set; False where rounding makes that singular."""
     n, H, count = 2 * inverse.size[0], inverse.matrix, 2 * coming.shape[0]
     for q in range(count):
-        _flexibility(points, inverse, 2 * coming[q // 2] + q % 2, work.rows[q])
+        _flexibilities(points, inverse, 2 * coming[q // 2] + q % 2, work.rows[q])
     clear(work.rows, count, n)
     multiplied_rows(H, n, work.rows, work.left)
     for q in range(count):
         i = 2 * coming[q // 2] + q % 2
         for r in range(count):
-            own = points.G[i, 2 * coming[r // 2] + r % 2] + (_compliance(points, i) if q == r else 0.0)
+            own = _flexibility(points, i, 2 * coming[r // 2] + r % 2) + (_compliance(points, i) if q == r else 0.0)
             work.small[q, r] = own - dot(work.rows[q], work.left[r], n)
     if not invert_small(work.small, count):
         return False
@@ -197,7 +204,7 @@ def build(points, inverse, state, work):
     n = 2 * size
     for k in range(n):
         i = 2 * inverse.point[k // 2] + k % 2
-        _flexibility(points, inverse, i, work.equations[k])
+        _flexibilities(points, inverse, i, work.equations[k])
         work.equations[k, k] += _compliance(points, i)
     if not factorise(work.equations, n, work.pivot):
         forget(inverse)

@@ -10,7 +10,8 @@ import numpy as np
 from .jit import kernel
 
 OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD = 0, 1, 2, 3
-"""States of a point; forward is the slip that grows with g_s, resisted by a positive lambda_s."""
+"""States of a point; forward is the slip that grows with g_s, resisted by a positive lambda_s. A closed point without friction
+slides, whichever way."""
 
 
 @kernel
@@ -29,7 +30,7 @@ def respond(gap_n, gap_s, slip, k_n, k_s, mu):
     normal = k_n * gap_n
     shear = k_s * (gap_s - slip)
     limit = -mu * normal
-    if abs(shear) <= limit:
+    if mu > 0.0 and abs(shear) <= limit:
         return STICK, normal, shear
     if shear > 0.0:
         return SLIP_FORWARD, normal, limit
@@ -71,7 +72,7 @@ def balance(G_nn, G_ns, G_ss, r_n, r_s, slip, k_n, k_s, mu):
     determinant = A * C - G_ns * G_ns
     normal = (C * r_n - G_ns * (r_s - slip)) / determinant
     shear = (A * (r_s - slip) - G_ns * r_n) / determinant
-    if normal <= 0.0 and abs(shear) <= -mu * normal:
+    if mu > 0.0 and normal <= 0.0 and abs(shear) <= -mu * normal:
         return STICK, normal, shear
     sign = 1.0 if shear > 0.0 else -1.0
     slope = A - sign * mu * G_ns

@@ -28,6 +28,8 @@ def _released(points, inverse, state, work):
         if state[p] == OPEN:
             work.queue[count], work.tie[count] = 2 * k, 0.0
             count += 1
+        if points.mu[p] == 0.0:
+            continue  # its shear calls up nothing
         work.queue[count], work.tie[count] = 2 * k + 1, tie(points, state[p], p)
         count += 1
     return count

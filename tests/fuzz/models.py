@@ -95,7 +95,7 @@ def _layers(rng: Generator, box: Table, domain: Table, features: list[str]) -> l
     bottoms = set((domain["depth"] * rng.uniform(0.02, 1.1, rng.integers(1, 5))).tolist())
     if _chance(rng, 0.2):
         features.append("boundary at a corner")
-        near = float(rng.choice([0.0, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6, 1e-3]))
+        near = float(rng.choice([0.0, 1e-12, -1e-12, 1e-10, -1e-10, 1e-3, -1e-3]))
         bottoms.add(float(rng.choice(lines)) * (1 + near))
     most = float(rng.choice([0.0, 0.5, 1.0, 2.0], p=[0.1, 0.3, 0.3, 0.3]))
     features.append(f"friction up to {most:g}")

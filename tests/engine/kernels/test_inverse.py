@@ -125,7 +125,21 @@ def test_lane_depends_on_no_other_and_on_nothing_in_the_scratch():
 def with_equations(A):
     """Points of stiffness one whose bonded equations are these."""
     n = len(A) // 2
-    return Points(np.array(A) - np.eye(2 * n), np.ones(n), np.ones(n), np.zeros(n), np.zeros(n))
+    return Points(np.array(A) - np.eye(2 * n), np.ones(n), np.ones(n), np.ones(n), np.zeros(n))
+
+
+def test_shear_without_friction_calls_up_nothing():
+    """It is never carried, so the other forces do not know of it, whether its point is there from the start or comes later."""
+    A = np.full((6, 6), 0.25) + np.diag([2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+    points = with_equations(A)._replace(mu=np.array([0.5, 0.0, 0.5]))
+    A[3], A[:, 3], A[3, 3] = 0.0, 0.0, 1.0
+    for first in (np.array([STICK, OPEN, STICK], np.int8), np.full(3, STICK, np.int8)):
+        inverse, work = inverse_of_lane(workspace(3, 1)), scratch(6)
+        assert build(points, inverse, first, work)
+        assert hold(points, inverse, np.full(3, STICK, np.int8), work)
+        order = np.concatenate([[2 * p, 2 * p + 1] for p in inverse.point])
+        # sums of six in another order
+        np.testing.assert_allclose(inverse.matrix, np.linalg.inv(A)[np.ix_(order, order)], rtol=0.0, atol=1e-15)
 
 
 def test_singular_equations_are_neither_built_nor_added():
