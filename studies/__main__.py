@@ -23,6 +23,9 @@ app = typer.Typer(
 StudyName = Annotated[str, typer.Argument(help="a study file, or the name of a shipped study (see list)")]
 ResultFile = Annotated[Path, typer.Argument(help="a results file, as in results/p0.nc")]
 Workers = Annotated[int | None, typer.Option(min=1, help="processes; as many as cores by default")]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="compute on the workers of a dask scheduler, as tcp://host:8786")
+]
 
 
 def main() -> None:
@@ -62,6 +65,7 @@ def run(
     everything: Annotated[bool, typer.Option("--all", help="run all shipped studies")] = False,
     out_file: Annotated[Path | None, typer.Option("--out", help="results file; results/NAME.nc by default")] = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="compute anew what is there already")] = False,
     figures: Annotated[bool, typer.Option("--plot", help="draw the figures too")] = False,
     case: Annotated[int | None, typer.Option(min=1, help="the case to --trace, counted from 1 in the order of `table`")] = None,
@@ -73,7 +77,7 @@ def run(
     if trace or case is not None:
         running.trace(names, case, trace)
     else:
-        running.run(names, out_file, workers, fresh, figures)
+        running.run(names, out_file, running.computing(workers, scheduler), fresh, figures)
 
 
 @app.command()
@@ -95,9 +99,10 @@ def show(results: ResultFile) -> None:
 
 
 @app.command()
-def rerun(results: ResultFile, workers: Workers = None) -> None:
+def rerun(results: ResultFile, workers: Workers = None, scheduler: Scheduler = None) -> None:
     """Repeat the study of a results file and say whether the results are the same."""
-    _commands("running").rerun(results, workers)
+    running = _commands("running")
+    running.rerun(results, running.computing(workers, scheduler))
 
 
 @app.command()

@@ -22,15 +22,24 @@ MAKERS = ("arrays.py", "batch.py", "scaling.py", "schema.py", "uplift.py")
 
 
 @cache
-def machine() -> str:
-    """Digest of what computes: the engine's sources, the packages that decide bits, the processor. Equal ones give equal bits."""
+def computer() -> dict[str, str]:
+    """What decides bits: digest of the engine's sources, versions of packages, lanes, processor."""
     here = Path(__file__).parent
     digest = sha256()
     for source in [*sorted((here.parent / "engine").rglob("*.py")), *(here / name for name in MAKERS)]:
         digest.update(source.name.encode() + b"\0" + source.read_bytes())
-    versions = " ".join(f"{package} {version(package)}" for package in PACKAGES)
-    digest.update(f"{versions} {LANES} {platform.system()} {platform.machine()} {get_host_cpu_name()}".encode())
-    return digest.hexdigest()
+    return {
+        "sources": digest.hexdigest()[:32],
+        **{package: version(package) for package in PACKAGES},
+        "lanes": str(LANES),
+        "processor": f"{platform.system()} {platform.machine()} {get_host_cpu_name()}",
+    }
+
+
+@cache
+def machine() -> str:
+    """Digest of what computes. Equal ones give equal bits."""
+    return sha256(repr(computer()).encode()).hexdigest()
 
 
 def provenance(study: Study) -> dict[str, str]:

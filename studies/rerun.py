@@ -17,7 +17,7 @@ from .dataset import read_records
 from .messages import StudyError
 from .plan import Study, make_study
 from .provenance import machine, records_sha256
-from .runner import Run, run_into, run_study
+from .runner import Run, Workers, run_into, run_study
 
 TOLERANCE = 1e-9
 """Of a case's largest value of a variable, where another machine or other versions compute: rounding grows to some 1e-12."""
@@ -75,7 +75,7 @@ class Repeated:
         return found
 
 
-def rerun(path: Path, workers: int | None, watch: Callable[[Run], Progress]) -> Repeated:
+def rerun(path: Path, workers: Workers, watch: Callable[[Run], Progress]) -> Repeated:
     """Compute the study of a results file anew and compare. StudyError where the file does not hold enough to do so."""
     with xr.open_dataset(path, engine="netcdf4") as before:
         study, records = _study_of(before, path)
@@ -151,7 +151,7 @@ def _difference(one: np.ndarray, two: np.ndarray, n_axes: int) -> np.ndarray:
         return np.where(off == 0, 0.0, np.maximum(off / np.where(size > 0, size, 1.0), np.finfo(float).tiny))
 
 
-def _chaotic(study: Study, after: xr.Dataset, cases: tuple[int, ...], workers: int | None) -> tuple[int, ...]:
+def _chaotic(study: Study, after: xr.Dataset, cases: tuple[int, ...], workers: Workers) -> tuple[int, ...]:
     """Those of the cases that a few roundings of the loads move by more than the tolerance, here and by themselves.
 
     Every step of theirs is solved as closely as any other's (`residual`): what differs is where rounding takes them.

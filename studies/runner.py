@@ -1,4 +1,4 @@
-"""Executes the batches of a study that are not on disk yet, one process a core, and merges them to one dataset."""
+"""Executes the batches of a study that are not on disk yet, here or on a cluster, and merges them to one dataset."""
 
 import errno
 import os
@@ -16,6 +16,7 @@ import xarray as xr
 from engine import Status, compile_kernels
 
 from .batch import Job, Progress
+from .cluster import Cluster, ClusterError
 from .dataset import COMPRESSED, Part, build_dataset, write_dataset_of
 from .domain_size import with_convergence
 from .files import clear_parts, whole
@@ -24,7 +25,7 @@ from .plan import Batch, Study, load_study
 from .pool import Broken, Crew, StartError, out_of_memory
 from .sizes import DomainSizes
 from .store import Entry, Names, Store, opened
-from .work import Ended, Task, carry_out
+from .work import Computed, Ended, Task, carry_out, compute
 
 TRIES = 3
 """After so many losses of the process that computes it, a case by itself is given up."""
@@ -35,20 +36,23 @@ TRIES_TOGETHER = 2
 MANIFEST_EVERY = 30.0
 """[s] between two writings of the manifest while batches come in."""
 
+Workers = int | str | None
+"""So many processes on this machine, as many as cores where None; or the address of a dask scheduler, whose workers compute."""
 
-def run(source: str | Path, workers: int | None = None) -> xr.Dataset:
+
+def run(source: str | Path, workers: Workers = None) -> xr.Dataset:
     """Run a study file or a shipped study and return its dataset; nothing is written. StudyError where the file is wrong."""
     return run_study(load_study(source), workers)
 
 
-def run_study(study: Study, workers: int | None = None, progress: Progress | None = None) -> xr.Dataset:
-    """Run all batches of a study; `workers` processes, as many as cores by default. Its batches are on disk meanwhile."""
+def run_study(study: Study, workers: Workers = None, progress: Progress | None = None) -> xr.Dataset:
+    """Run all batches of a study, by default with as many processes as cores. Its batches are on disk meanwhile."""
     with TemporaryDirectory(prefix="coralquake-", ignore_cleanup_errors=True) as folder:
         ds = build_dataset(study, Run(study, Store(Path(folder))).carried_out(workers, progress))
     return with_convergence(ds, study.sizes) if study.sizes else ds
 
 
-def run_into(path: Path, study: Study, workers: int | None, watch: Callable[["Run"], Progress], fresh: bool = False) -> None:
+def run_into(path: Path, study: Study, workers: Workers, watch: Callable[["Run"], Progress], fresh: bool = False) -> None:
     """Run what is left of a study and write its results file. Its batches stay beside it, for this study and longer ones.
 
     watch : called once with what there is, returns what is told of the progress. StudyError where another run is at it or no
@@ -153,21 +157,19 @@ class Run:
     def _steps(self, piece: Piece) -> int:
         return sum(self.study.steps(case) for case in piece.batch.cases)
 
-    def carried_out(self, workers: int | None, progress: Progress | None, apart: bool = False) -> list[Part]:
+    def carried_out(self, workers: Workers, progress: Progress | None, apart: bool = False) -> list[Part]:
         """Compute what is left. StudyError where nothing comes of any case, OSError where a file cannot be written.
 
         A single worker and a single batch are computed in this process; `apart`: batches of a larger study never are, so that
         one that kills its process does not end the others.
         """
-        size = min(workers or os.cpu_count() or 1, len(self.study.batches))
-        alone = size == 1 and not (apart and len(self.study.batches) > 1)
         tell = progress or (lambda steps: None)
         self._tell_manifest()
         try:
-            if alone:
+            if self._alone(workers, apart):
                 self._compute_here(tell)
             elif self._left:
-                self._compute_apart(min(size, len(self._left)), tell)
+                self._compute_apart(workers, tell)
         finally:
             with suppress(OSError):  # what stopped the run is told, not that this fails too
                 self.store.write_manifest(self.study, self.entries)
@@ -175,6 +177,10 @@ class Run:
         if not any(part.is_there for part in found):
             raise StudyError(sorted({f"{self.study.name}: {reason}" for part in found for reason in part.reason}))
         return found
+
+    def _alone(self, workers: Workers, apart: bool) -> bool:
+        n = len(self.study.batches)
+        return not isinstance(workers, str) and min(workers or os.cpu_count() or 1, n) == 1 and not (apart and n > 1)
 
     def _compute_here(self, progress: Progress) -> None:
         while self._left:
@@ -186,12 +192,17 @@ class Run:
                 answer = Broken(out_of_memory(error))
             self._settle(piece, answer, progress)
 
-    def _compute_apart(self, size: int, progress: Progress) -> None:
-        """One task is made ahead: its motions wait in memory, a process that becomes free does not wait for it."""
+    def _crew(self, workers: Workers) -> Crew | Cluster:
+        if isinstance(workers, str):
+            return Cluster(workers, compute)
         compile_kernels()  # once, not in every process
+        return Crew(min(workers or os.cpu_count() or 1, len(self._left)), carry_out)
+
+    def _compute_apart(self, workers: Workers, progress: Progress) -> None:
+        """One task is made ahead: its motions wait in memory, a process that becomes free does not wait for it."""
         ahead: tuple[Piece, Task] | None = None
         try:
-            with Crew(size, carry_out) as crew:
+            with self._crew(workers) as crew:
                 while self._left or ahead or crew.busy:
                     if self._left and not ahead:
                         ahead = self._next()
@@ -201,7 +212,9 @@ class Run:
                         ahead = None
                         continue
                     for piece, answer in crew.answers(partial(self._tell, progress)):
-                        self._settle(piece, answer, progress)
+                        self._settle(piece, self._kept(piece, answer), progress)
+        except ClusterError as error:
+            raise StudyError([f"{self.study.name}: {error}"]) from None
         except StartError as error:
             hint = 'in a script, what runs a study stands below `if __name__ == "__main__":`'
             raise StudyError([f"{self.study.name}: {error}; {hint}"]) from None
@@ -209,6 +222,10 @@ class Run:
     def _next(self) -> tuple[Piece, Task]:
         piece = self._left.popleft()
         return piece, Task(Job.of(self.study, piece.batch), self.store.path(piece.name))
+
+    def _kept(self, piece: Piece, answer: Ended | Computed | Broken) -> Ended | Broken:
+        """What came of a piece; what another machine has sent of it is on disk then."""
+        return answer.written(self.store.path(piece.name)) if isinstance(answer, Computed) else answer
 
     def _tell(self, progress: Progress, piece: Piece, steps: int) -> None:
         self._told[piece.name] += steps

@@ -23,7 +23,7 @@ from ..messages import StudyError
 from ..plan import Study, shipped_studies
 from ..provenance import study_hash
 from ..rerun import rerun as repeat
-from ..runner import Run, run_into
+from ..runner import Run, Workers, run_into
 from ..show import TRACE_HEAD, trace_line
 from ..store import Store
 from ..tables import failures, sentences
@@ -43,7 +43,14 @@ def named(studies: list[str] | None, everything: bool) -> list[str]:
     return names
 
 
-def run(names: list[str], out_file: Path | None, workers: int | None, fresh: bool, figures: bool) -> None:
+def computing(workers: int | None, scheduler: str | None) -> Workers:
+    """What computes: processes here or the workers of a scheduler."""
+    if workers is not None and scheduler is not None:
+        raise refuse([f"--workers {workers}: is for this machine; those of --scheduler {scheduler} are started with dask worker"])
+    return scheduler or workers
+
+
+def run(names: list[str], out_file: Path | None, workers: Workers, fresh: bool, figures: bool) -> None:
     """Run studies; write a netCDF file for each, and say what happened."""
     if out_file is not None and len(names) > 1:
         raise refuse([f"--out {out_file}: is for one study, {len(names)} are named"])
@@ -112,7 +119,7 @@ def _check_paths(paths: list[Path], sources: list[str]) -> None:
         raise refuse(wrong)
 
 
-def _make(study: Study, path: Path, workers: int | None, fresh: bool) -> float:
+def _make(study: Study, path: Path, workers: Workers, fresh: bool) -> float:
     """The seconds it took to make the results file, zero where it was there already."""
     if not fresh and _is_finished(study, path):
         return 0.0
@@ -168,7 +175,7 @@ def _watched(name: str, path: Path) -> Iterator[Watch]:
         raise refuse([f"{_place(error, path)}: {_why(error)} {_kept(runs)}"]) from None
 
 
-def rerun(path: Path, workers: int | None) -> None:
+def rerun(path: Path, workers: Workers) -> None:
     """Repeat the study of a results file and say whether the results are the same."""
     with opened_results(path) as ds:
         name = str(ds.attrs["study_name"])

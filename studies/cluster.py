@@ -1,0 +1,280 @@
+"""Processes on many machines that compute: the workers of a dask scheduler, with the interface of `pool.Crew`.
+
+A task goes to one worker and to no other, so that a worker that is lost loses what it was at, no more, and whoever asked
+decides what to do then. What a task gives is sent back: workers write nothing.
+"""
+
+import asyncio
+import logging
+import pickle
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Self
+from uuid import uuid4
+
+from engine import compile_kernels
+
+from .pool import PATIENCE, TICK, Broken, Function, out_of_memory
+from .provenance import computer
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+CONNECT = 5.0
+"""[s] within which a scheduler must answer."""
+
+RESTART = 60.0
+"""[s] that a worker which hangs is given to be ended and started again."""
+
+LEFT = "left the cluster: it was killed, ran out of memory or was cut off"
+
+log = logging.getLogger(__name__)
+
+
+class ClusterError(RuntimeError):
+    """There is no cluster, or none of its workers can compute what is asked for."""
+
+
+class _WithdrawnError(Exception):
+    """Nobody waits for the task any more."""
+
+
+@dataclass
+class _Member:
+    """A worker and what it is asked: first who it is, then, once it is `ready`, one task after the other.
+
+    unfit : why it gets no tasks
+    begun, silent : whether it is at its task, and for how long [s] it has said nothing
+    """
+
+    asked: "Future | None" = None
+    ready: bool = False
+    unfit: str = ""
+    ticket: Any = None
+    begun: bool = False
+    silent: float = 0.0
+
+
+class Cluster:
+    """The workers of a scheduler, also those that come later. Use as a context: at its end they drop what they are at."""
+
+    def __init__(self, address: str, function: Function, patience: float = PATIENCE) -> None:
+        self._address, self._function, self._patience = address, function, patience
+        self._topic = f"coralquake-{uuid4().hex}"
+        self._members: dict[str, _Member] = {}
+        self._said: SimpleQueue[tuple[str, int | None]] = SimpleQueue()
+        self._next_look, self._waiting = 0.0, False
+
+    def __enter__(self) -> Self:
+        """ClusterError where no scheduler answers."""
+        self._client = _connected(self._address)
+        self._client.subscribe_topic(self._topic, lambda event: self._said.put(event[1]))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._client.status == "running":
+            with suppress(OSError):  # the scheduler has just gone
+                self._client.cancel([member.asked for member in self._members.values() if member.asked is not None])
+        self._client.close()
+
+    @property
+    def free(self) -> bool:
+        """Whether a worker waits for a task."""
+        return any(member.ready and member.asked is None for member in self._members.values())
+
+    @property
+    def busy(self) -> bool:
+        """Whether a worker computes."""
+        return any(member.ready and member.asked is not None for member in self._members.values())
+
+    def give(self, ticket: Any, task: Any) -> None:
+        """Let a free worker compute a task; `ticket` comes back with the answer."""
+        address, member = next((a, m) for a, m in self._members.items() if m.ready and m.asked is None)
+        member.ticket, member.begun, member.silent = ticket, False, 0.0
+        member.asked = self._ask(address, _serve, pickle.dumps((self._function, task)), self._topic)
+
+    def answers(self, tell: Callable[[Any, int], None]) -> Iterator[tuple[Any, Any]]:
+        """Tickets with answers or `Broken`, as they come within a second; `tell` hears of progress.
+
+        ClusterError where no worker can compute; OSError where the scheduler has gone.
+        """
+        began = time.monotonic()
+        with suppress(Empty):
+            yield from self._heard(*self._said.get(timeout=TICK), tell)
+        elapsed = min(time.monotonic() - began, 2 * TICK)
+        for address, member in self._members.items():
+            member.silent += elapsed
+            if member.begun and member.silent > self._patience:
+                yield from self._hung(address, member)
+        if time.monotonic() >= self._next_look:
+            yield from self._look()
+            self._next_look = time.monotonic() + TICK
+
+    def _ask(self, address: str, function: Callable, *arguments: Any) -> "Future":
+        import dask
+
+        with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TiB"}):  # a task brings its motions
+            future = self._client.submit(function, *arguments, workers=[address], allow_other_workers=False, pure=False)
+        future.add_done_callback(lambda done: self._said.put((done.key, None)))
+        return future
+
+    def _heard(self, key: str, steps: int | None, tell: Callable[[Any, int], None]) -> Iterator[tuple[Any, Any]]:
+        """A worker has begun (0 steps), come further, or, where None, is done."""
+        at_it = [(a, m) for a, m in self._members.items() if m.asked is not None and m.asked.key == key]
+        for address, member in at_it:
+            member.silent = 0.0
+            if steps is None:
+                yield from self._done(address, member)
+            elif steps:
+                tell(member.ticket, steps)
+            elif member.begun:  # again, in a process that took the place of the one before
+                yield from self._lost(member, LEFT)
+            else:
+                member.begun = True
+
+    def _done(self, address: str, member: _Member) -> Iterator[tuple[Any, Any]]:
+        answer = self._fetched(address, member)
+        if member.ready:
+            yield self._released(member), answer
+        else:
+            member.asked = None
+            self._judge(address, member, answer)
+
+    def _fetched(self, address: str, member: _Member) -> Any:
+        """What a worker that is done has sent, or `Broken`."""
+        from distributed import CancelledError, KilledWorker
+
+        loop = self._client.loop.asyncio_loop
+        fetching = asyncio.run_coroutine_threadsafe(self._client.gather(member.asked, asynchronous=True), loop)
+        while True:
+            try:
+                return fetching.result(TICK)
+            except TimeoutError:
+                if fetching.done() or address not in self._present():
+                    fetching.cancel()
+                    return Broken(LEFT)
+            except (KilledWorker, CancelledError):
+                self._present()  # or else it is the scheduler that has gone
+                return Broken(LEFT)
+            except Exception as error:  # where a task is unpacked, among other things
+                return Broken(f"met {type(error).__name__}: {error}")
+
+    def _judge(self, address: str, member: _Member, answer: Mapping[str, str] | Broken) -> None:
+        """Take a worker in that computes the bits that this process would; name the others. One that has left is no matter."""
+        member.ready = answer == computer()
+        if not member.ready and answer != Broken(LEFT):
+            member.unfit = answer.reason if isinstance(answer, Broken) else _differences(answer)
+            self._leave_out(address, member)
+
+    def _leave_out(self, address: str, member: _Member) -> None:
+        """Say why a worker gets no tasks. ClusterError where no other one is left."""
+        said = f"worker {address}: {member.unfit}"
+        if all(member.unfit for member in self._members.values()):
+            raise ClusterError(said)
+        log.warning("%s; it is left out", said)
+
+    def _look(self) -> Iterator[tuple[Any, Any]]:
+        """Notice workers that have come and gone."""
+        present = self._present()
+        for address in self._members.keys() - present.keys():
+            yield from self._lost(self._members.pop(address), LEFT)
+        for address in present.keys() - self._members.keys():
+            self._members[address] = _Member()
+        for address, member in self._members.items():
+            if member.asked is None and not member.ready and not member.unfit:
+                self._welcome(address, member, present[address])
+        if not present and not self._waiting:
+            log.warning("scheduler %s: has no workers; waiting for the first", self._address)
+        self._waiting = not present
+
+    def _welcome(self, address: str, member: _Member, threads: int) -> None:
+        if threads == 1:
+            member.asked = self._ask(address, _presented, computer())
+        else:
+            member.unfit = f"has {threads} threads, must have one (dask worker --nthreads 1)"
+            self._leave_out(address, member)
+
+    def _present(self) -> Mapping[str, int]:
+        """Number of threads of each worker that is there."""
+        import dask
+
+        try:
+            with dask.config.set({"distributed.comm.timeouts.connect": CONNECT}):
+                if self._client.status == "running":
+                    return self._client.nthreads()
+        except OSError:
+            pass
+        raise OSError(None, f"the scheduler {self._address} no longer answers")
+
+    def _hung(self, address: str, member: _Member) -> Iterator[tuple[Any, Any]]:
+        """Have a worker started anew; one that nobody watches over gets no further tasks."""
+        yield from self._lost(member, f"gave no sign of life for {self._patience:g} s")
+        try:
+            self._client.restart_workers([address], timeout=RESTART, raise_for_error=False)
+        except ValueError:
+            member.ready, member.unfit = False, "hangs"
+            self._leave_out(address, member)
+
+    def _lost(self, member: _Member, reason: str) -> Iterator[tuple[Any, Any]]:
+        if member.ready and member.asked is not None:
+            member.asked.cancel()
+            yield self._released(member), Broken(reason)
+
+    @staticmethod
+    def _released(member: _Member) -> Any:
+        """The ticket of a worker, which is free now."""
+        ticket, member.ticket, member.asked, member.begun = member.ticket, None, None, False
+        return ticket
+
+
+def _connected(address: str) -> "Client":
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise ClusterError('a scheduler needs dask.distributed: pip install "coralquake[cluster]"') from None
+    try:
+        return Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        why = f"does not answer within {CONNECT:g} s" if isinstance(error, OSError) else f"is no address of one: {error}"
+        raise ClusterError(f"scheduler {address}: {why}") from None
+
+
+def _differences(theirs: Mapping[str, str]) -> str:
+    """What computes other bits there."""
+    pairs = (f"{name} {theirs[name]}, here {here}" for name, here in computer().items() if theirs[name] != here)
+    return f"would compute other bits: {'; '.join(pairs)}"
+
+
+# on a worker ------------------------------------------------------------------------------------------------------------------
+
+
+def _presented(asking: Mapping[str, str]) -> Mapping[str, str]:
+    """What decides bits here; where it is as there, the kernels are compiled, once a process."""
+    if computer() == asking:
+        compile_kernels()
+    return computer()
+
+
+def _serve(packed: bytes, topic: str) -> Any:
+    """Compute what comes, unpacked here and not by the scheduler; what this machine lacks is no fault of the others."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def tell(steps: int) -> None:
+        if worker.state.tasks[key].state != "executing":
+            raise _WithdrawnError
+        worker.log_event(topic, (key, steps))
+
+    tell(0)
+    try:
+        function, task = pickle.loads(packed)
+        return function(task, tell)
+    except MemoryError as error:
+        return Broken(out_of_memory(error))
+    except OSError as error:
+        return Broken(f"met an error of its machine: {error}")
