@@ -6,10 +6,12 @@ decides what to do then. What a task gives is sent back: workers write nothing.
 
 import asyncio
 import logging
+import os
 import pickle
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Self
@@ -26,8 +28,13 @@ if TYPE_CHECKING:
 CONNECT = 5.0
 """[s] within which a scheduler must answer."""
 
-RESTART = 60.0
-"""[s] that a worker which hangs is given to be ended and started again."""
+TELL = 0.5
+"""[s] between two tellings of progress: those of all workers pass through one scheduler."""
+
+BEGUN, DONE = -1, -2
+"""What is said of a task beside the steps that it has come further."""
+
+ADDRESS = re.compile(r"(tcp|tls)://[^/]+:\d+")
 
 LEFT = "left the cluster: it was killed, ran out of memory or was cut off"
 
@@ -65,7 +72,7 @@ class Cluster:
         self._address, self._function, self._patience = address, function, patience
         self._topic = f"coralquake-{uuid4().hex}"
         self._members: dict[str, _Member] = {}
-        self._said: SimpleQueue[tuple[str, int | None]] = SimpleQueue()
+        self._said: SimpleQueue[tuple[str, int]] = SimpleQueue()
         self._next_look, self._waiting = 0.0, False
 
     def __enter__(self) -> Self:
@@ -75,10 +82,11 @@ class Cluster:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._client.status == "running":
-            with suppress(OSError):  # the scheduler has just gone
-                self._client.cancel([member.asked for member in self._members.values() if member.asked is not None])
-        self._client.close()
+        asked = [member.asked for member in self._members.values() if member.asked is not None]
+        with _quiet(), suppress(OSError):  # where the scheduler has gone, that has been said
+            if self._client.status == "running":
+                self._client.cancel(asked)
+            self._client.close()
 
     @property
     def free(self) -> bool:
@@ -118,17 +126,16 @@ class Cluster:
 
         with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TiB"}):  # a task brings its motions
             future = self._client.submit(function, *arguments, workers=[address], allow_other_workers=False, pure=False)
-        future.add_done_callback(lambda done: self._said.put((done.key, None)))
+        future.add_done_callback(lambda done: self._said.put((done.key, DONE)))
         return future
 
-    def _heard(self, key: str, steps: int | None, tell: Callable[[Any, int], None]) -> Iterator[tuple[Any, Any]]:
-        """A worker has begun (0 steps), come further, or, where None, is done."""
+    def _heard(self, key: str, steps: int, tell: Callable[[Any, int], None]) -> Iterator[tuple[Any, Any]]:
         at_it = [(a, m) for a, m in self._members.items() if m.asked is not None and m.asked.key == key]
         for address, member in at_it:
             member.silent = 0.0
-            if steps is None:
+            if steps == DONE:
                 yield from self._done(address, member)
-            elif steps:
+            elif steps != BEGUN:
                 tell(member.ticket, steps)
             elif member.begun:  # again, in a process that took the place of the one before
                 yield from self._lost(member, LEFT)
@@ -210,13 +217,12 @@ class Cluster:
         raise OSError(None, f"the scheduler {self._address} no longer answers")
 
     def _hung(self, address: str, member: _Member) -> Iterator[tuple[Any, Any]]:
-        """Have a worker started anew; one that nobody watches over gets no further tasks."""
-        yield from self._lost(member, f"gave no sign of life for {self._patience:g} s")
-        try:
-            self._client.restart_workers([address], timeout=RESTART, raise_for_error=False)
-        except ValueError:
-            member.ready, member.unfit = False, "hangs"
-            self._leave_out(address, member)
+        """End a worker's process; dask's nanny starts another one, where there is a nanny."""
+        ending = self._client.run(os._exit, 1, workers=[address], on_error="ignore", asynchronous=True)
+        asyncio.run_coroutine_threadsafe(ending, self._client.loop.asyncio_loop)
+        reason = f"gave no sign of life for {self._patience:g} s"
+        yield from self._lost(member, reason)
+        member.ready, member.unfit = False, reason
 
     def _lost(self, member: _Member, reason: str) -> Iterator[tuple[Any, Any]]:
         if member.ready and member.asked is not None:
@@ -235,11 +241,24 @@ def _connected(address: str) -> "Client":
         from distributed import Client
     except ModuleNotFoundError:
         raise ClusterError('a scheduler needs dask.distributed: pip install "coralquake[cluster]"') from None
+    if not ADDRESS.fullmatch(address):
+        raise ClusterError(f"scheduler {address!r}: must be an address as tcp://host:8786")
     try:
         return Client(address, timeout=CONNECT, set_as_default=False)
-    except (OSError, ValueError) as error:
-        why = f"does not answer within {CONNECT:g} s" if isinstance(error, OSError) else f"is no address of one: {error}"
-        raise ClusterError(f"scheduler {address}: {why}") from None
+    except OSError:
+        raise ClusterError(f"scheduler {address}: does not answer within {CONNECT:g} s") from None
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """The client says nothing inside."""
+    its_log = logging.getLogger("distributed.client")
+    before = its_log.level
+    its_log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        its_log.setLevel(before)
 
 
 def _differences(theirs: Mapping[str, str]) -> str:
@@ -265,12 +284,18 @@ def _serve(packed: bytes, topic: str) -> Any:
     worker = get_worker()
     key = worker.get_current_task()
 
+    steps_since, next_telling = 0, 0.0
+
     def tell(steps: int) -> None:
+        nonlocal steps_since, next_telling
         if worker.state.tasks[key].state != "executing":
             raise _WithdrawnError
-        worker.log_event(topic, (key, steps))
+        steps_since += steps
+        if time.monotonic() >= next_telling:
+            worker.log_event(topic, (key, steps_since))
+            steps_since, next_telling = 0, time.monotonic() + TELL
 
-    tell(0)
+    worker.log_event(topic, (key, BEGUN))
     try:
         function, task = pickle.loads(packed)
         return function(task, tell)

@@ -7,7 +7,7 @@ import pytest
 
 import studies
 
-HEAVY = {"matplotlib", "pandas", "xarray", "netCDF4", "pint", "obspy"}
+HEAVY = {"matplotlib", "pandas", "xarray", "netCDF4", "pint", "obspy", "dask", "distributed"}
 HEAVY |= {f"scipy.{name}" for name in ("stats", "signal", "integrate", "fft")}
 
 

@@ -47,7 +47,7 @@ def computing(workers: int | None, scheduler: str | None) -> Workers:
     """What computes: processes here or the workers of a scheduler."""
     if workers is not None and scheduler is not None:
         raise refuse([f"--workers {workers}: is for this machine; those of --scheduler {scheduler} are started with dask worker"])
-    return scheduler or workers
+    return workers if scheduler is None else scheduler
 
 
 def run(names: list[str], out_file: Path | None, workers: Workers, fresh: bool, figures: bool) -> None:
