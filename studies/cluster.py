@@ -219,7 +219,8 @@ class Cluster:
     def _hung(self, address: str, member: _Member) -> Iterator[tuple[Any, Any]]:
         """End a worker's process; dask's nanny starts another one, where there is a nanny."""
         ending = self._client.run(os._exit, 1, workers=[address], on_error="ignore", asynchronous=True)
-        asyncio.run_coroutine_threadsafe(ending, self._client.loop.asyncio_loop)
+        with suppress(OSError):  # a TimeoutError is one
+            asyncio.run_coroutine_threadsafe(ending, self._client.loop.asyncio_loop).result(CONNECT)
         reason = f"gave no sign of life for {self._patience:g} s"
         yield from self._lost(member, reason)
         member.ready, member.unfit = False, reason
