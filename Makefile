@@ -50,6 +50,10 @@ help: ## list the targets
 	@if $(PIP) install --quiet --only-binary :all: --constraint pins.txt --editable ".[peer]"; then touch $@; \
 	else echo "OpenSeesPy could not be installed: versus shows its stored result, bench says so"; fi
 
+.venv/cluster: .venv/installed
+	$(PIP) install --quiet --only-binary :all: --constraint pins.txt --editable ".[cluster]"
+	@touch $@
+
 install: .venv/installed
 	@echo "ready: $(BIN)/coralquake --help"
 
@@ -72,7 +76,7 @@ figures: .venv/installed
 versus: .venv/peer
 	$(BIN)/python -m benchmarks.versus
 
-bench: .venv/peer
+bench: .venv/cluster .venv/peer
 	$(BIN)/python -m benchmarks
 
 bench-large: .venv/installed

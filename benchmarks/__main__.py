@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from . import bench, growth, lanes, phases, ratio, startup, workers
+from . import bench, cluster, growth, lanes, phases, ratio, startup, workers
 from .clock import pinned
 from .peer import SOLVERS, opensees, opensees_version
 
@@ -91,6 +91,24 @@ def of_workers(console: Console, quick: bool) -> Found:
     return {"two_workers_speedup": found.speedup, "two_workers": asdict(found)}
 
 
+def of_cluster(console: Console, quick: bool) -> Found:
+    """Beside the pool."""
+    if not cluster.is_installed():
+        console.print("cluster: dask.distributed is not installed")
+        return {"cluster_overhead": None, "cluster": []}
+    title = (
+        f"1,000 cases of 1,000 steps, {cluster.WORKERS} processes of the pool and of a dask cluster, wall time, start included"
+    )
+    with growing(console, title, cluster.HEADINGS, f"goal: at most {cluster.GOAL:.0%}, median") as add:
+        found = cluster.pairs(
+            cluster.thousand(),
+            1 if quick else 5,
+            lambda pair: add(f"{pair.pool:.1f}", f"{pair.cluster:.1f}", f"{pair.overhead:+.1%}"),
+        )
+    console.print(f"\nmedian {cluster.overhead(found):+.1%}")
+    return {"cluster_overhead": cluster.overhead(found), "cluster": [asdict(pair) for pair in found]}
+
+
 def of_startup(console: Console, quick: bool) -> Found:
     """From the shell."""
     with growing(console, "Seconds to start", ("what", "seconds", "goal"), "") as add:
@@ -113,6 +131,7 @@ TABLES: dict[str, Callable[[Console, bool], Found]] = {
     "ratio": ratios,
     "growth": of_growth,
     "workers": of_workers,
+    "cluster": of_cluster,
     "startup": of_startup,
 }
 

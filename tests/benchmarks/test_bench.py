@@ -51,7 +51,7 @@ def test_unknown_table_is_refused(file, capsys):
     with pytest.raises(SystemExit) as refused:
         command.main(["lane"])
     assert refused.value.code == 2
-    assert "lane: no such table; there are lanes, phases, ratio, growth, workers, startup" in capsys.readouterr().err
+    assert "lane: no such table; there are lanes, phases, ratio, growth, workers, cluster, startup" in capsys.readouterr().err
     assert not file.exists()
 
 
@@ -104,3 +104,21 @@ def test_two_workers_are_told(monkeypatch):
     console = shown()
     assert command.of_workers(console, True)["two_workers_speedup"] == pytest.approx(10 / 5.2)
     assert "1.92" in console.file.getvalue()
+
+
+def test_the_cluster_is_told_beside_the_pool(monkeypatch):
+    found = [command.cluster.Pair(10.0, 10.5), command.cluster.Pair(10.0, 10.8), command.cluster.Pair(10.0, 10.6)]
+    monkeypatch.setattr(command.cluster, "is_installed", lambda: True)
+    monkeypatch.setattr(command.cluster, "pairs", lambda study, n, seen: [seen(pair) or pair for pair in found])
+    console = shown()
+    told = command.of_cluster(console, False)
+    assert told["cluster_overhead"] == pytest.approx(0.06, rel=1e-12)
+    assert told["cluster"][1] == {"pool": 10.0, "cluster": 10.8}
+    assert "median +6.0%" in console.file.getvalue()
+
+
+def test_a_cluster_that_is_not_installed_is_told(monkeypatch):
+    monkeypatch.setattr(command.cluster, "is_installed", lambda: False)
+    console = shown()
+    assert command.of_cluster(console, False) == {"cluster_overhead": None, "cluster": []}
+    assert "not installed" in console.file.getvalue()
