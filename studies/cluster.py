@@ -150,12 +150,16 @@ class Cluster:
             member.asked = None
             self._judge(address, member, answer)
 
+    def _begun(self, work: Any) -> Any:
+        """The future of a coroutine, in the client's own thread."""
+        loop: Any = self._client.loop
+        return asyncio.run_coroutine_threadsafe(work, loop.asyncio_loop)
+
     def _fetched(self, address: str, member: _Member) -> Any:
         """What a worker that is done has sent, or `Broken`."""
         from distributed import CancelledError, KilledWorker
 
-        loop = self._client.loop.asyncio_loop
-        fetching = asyncio.run_coroutine_threadsafe(self._client.gather(member.asked, asynchronous=True), loop)
+        fetching = self._begun(self._client.gather(member.asked, asynchronous=True))
         while True:
             try:
                 return fetching.result(TICK)
@@ -220,7 +224,7 @@ class Cluster:
         """End a worker's process; dask's nanny starts another one, where there is a nanny."""
         ending = self._client.run(os._exit, 1, workers=[address], on_error="ignore", asynchronous=True)
         with suppress(OSError):  # a TimeoutError is one
-            asyncio.run_coroutine_threadsafe(ending, self._client.loop.asyncio_loop).result(CONNECT)
+            self._begun(ending).result(CONNECT)
         reason = f"gave no sign of life for {self._patience:g} s"
         yield from self._lost(member, reason)
         member.ready, member.unfit = False, reason
