@@ -132,7 +132,7 @@ FILES = [
     ),
     bad(
         "box a hair below the surface",
-        '[box]\ndepth = "1e-6 m"\nheight = "4.5 m"',
+        '[box]\ndepth = "1e-6 m"\nheight = "5.3 m"',
         ("box.depth", "1e-06 m", "leaves 1e-06 m of ground to the surface"),
     ),
     bad(

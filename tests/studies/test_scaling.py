@@ -145,14 +145,15 @@ def assert_like_one_by_one(study, ds, exact):
 
 
 def closeness(name):
-    """How near a march with other factors comes, of the peak: rounding, 1e-16, times what the effective matrix makes of it, 1e4.
+    """How near a march with other factors comes, of the peak: the joint solve ends within 1e-12 of the gaps (D9), and each step
+    hands on what is left of some before, by damping.
 
     Gaps, rackings and what changes with them are differences of numbers up to a hundred times as large. Single precision
     rounds twice, by 2^-24 each.
     """
     if name in SINGLE:
         return 2.0**-23
-    return 1e-12 if name in ("displacement", "peak_displacement", "stress", "peak_stress", "shape") else 1e-10
+    return 1e-11 if name in ("displacement", "peak_displacement", "stress", "peak_stress", "shape") else 1e-10
 
 
 def test_powers_of_two_give_the_bits_of_each_case_by_itself():

@@ -56,6 +56,7 @@ def test_the_bytes_of_a_record_decide(tmp_path):
 
 
 def test_versions_sources_and_processor_decide(monkeypatch):
+    monkeypatch.setattr(provenance, "computer", provenance.computer.__wrapped__)
     found = {provenance.machine.__wrapped__()}
     for name, other in (("version", lambda package: "0"), ("get_host_cpu_name", lambda: "other"), ("MAKERS", ())):
         with monkeypatch.context() as context:
