@@ -96,9 +96,7 @@ def of_cluster(console: Console, quick: bool) -> Found:
     if not cluster.is_installed():
         console.print("cluster: dask.distributed is not installed")
         return {"cluster_overhead": None, "cluster": []}
-    title = (
-        f"1,000 cases of 1,000 steps, {cluster.WORKERS} processes of the pool and of a dask cluster, wall time, start included"
-    )
+    title = f"1,000 cases by {cluster.WORKERS} processes, start included"
     with growing(console, title, cluster.HEADINGS, f"goal: at most {cluster.GOAL:.0%}, median") as add:
         found = cluster.pairs(
             cluster.thousand(),

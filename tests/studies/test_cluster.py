@@ -172,6 +172,34 @@ def test_workers_drop_what_nobody_waits_for(scheduler):
             time.sleep(0.05)
 
 
+def is_sampled(task, progress):
+    """Whether dask's profiler still looks at this worker after a while."""
+    profiler = distributed.get_worker().periodic_callbacks["profile"]
+    for _ in range(500):
+        if not profiler.is_running():
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def test_nobody_looks_over_a_worker_s_shoulder_while_it_computes(scheduler):
+    with Cluster(scheduler, is_sampled) as crew:
+        while not crew.free:
+            list(crew.answers(print))
+        crew.give("task", 0)
+        found = []
+        while crew.busy:
+            found += crew.answers(print)
+    assert found == [("task", False)]
+    with distributed.Client(scheduler, set_as_default=False) as client:
+        while not all(client.run(is_profiled).values()):
+            time.sleep(0.01)
+
+
+def is_profiled(dask_worker):
+    return dask_worker.periodic_callbacks["profile"].is_running()
+
+
 def test_a_task_that_a_worker_cannot_unpack_is_lost(scheduler, monkeypatch):
     monkeypatch.setattr(cluster.pickle, "dumps", lambda task: b"no pickle")
     assert worked(scheduler, ["task"])[0]["task"].reason.startswith("met UnpicklingError: ")
