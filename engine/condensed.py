@@ -47,8 +47,8 @@ def no_dashpots(m: int) -> Dashpots:
 
 def eliminated(slope: Floats, G: Floats) -> tuple[Floats, Floats]:
     """P and the flexibility that is left, both (m, m), for dashpots with slopes (m,); see Dashpots."""
-    root = np.sqrt(slope)
-    P = np.outer(root, root) * np.linalg.inv(np.eye(len(G)) + np.outer(root, root) * G)
+    roots = np.outer(np.sqrt(slope), np.sqrt(slope))
+    P = roots * np.linalg.inv(np.eye(len(G)) + roots * G)
     left = G - G @ P @ G
     return P, 0.5 * (left + left.T)
 

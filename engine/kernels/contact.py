@@ -1,10 +1,10 @@
 """The condensed joint solve of one lane (D9): g + G lambda(g) = g_free with the law of `joint` at every point.
 
 The states of the last step are tried first, with the inverse kept from then. Where a state does not hold,
-the solution itself says what comes next (a Newton step on the states); Newton can cycle, so every second time block Gauss-Seidel
+the solution itself says what comes next (a Newton step on the states); Newton can cycle, so now and then block Gauss-Seidel
 sweeps propose states instead: by turns from the direct solution brought back onto the law, which has the rigid motions right,
-and on from the last sweep, which cannot cycle; twice as many sweeps each time. What is not found in ten rounds is followed
-along a path (`follow`).
+and on from the last sweep, which cannot cycle; twice as many sweeps each time. What is not found so is followed along a path
+(`follow`).
 """
 
 import numpy as np
@@ -151,8 +151,8 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
             let_go(inverse, state, work.work)
             return attempt, residual
         if attempt == FOLLOW_AFTER:
-            for near in (True, False):
-                if follow(points, kept, work, g_free, near, proposal, g, lam):
+            for from_near in (True, False):
+                if follow(points, kept, work, g_free, from_near, proposal, g, lam):
                     break
         elif attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
             if attempt % (2 * NEWTON_ROUNDS) != 0:

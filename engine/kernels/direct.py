@@ -19,7 +19,6 @@ EQUATION_TOLERANCE = 1e-12
 GAP_TOLERANCE = 1e-11
 """Residual over the gaps beyond which a solution is refined; a floating box, say, has free gaps a million times larger."""
 
-
 PASSES = 5
 """Solves in a row, each for what the one before has left; a new inverse costs as much as fifty."""
 

@@ -71,13 +71,13 @@ def _begin_afar(points, work, g_free, state):
 
 
 @kernel
-def follow(points, kept, work, g_free, near, state, g, lam):
+def follow(points, kept, work, g_free, from_near, state, g, lam):
     """Follow the solution from the gaps of the last step, in work.start, or from afar, to g_free, a border of states at a time.
 
     The law is piecewise linear, so the path is a chain of straight pieces, each a direct solve at both ends. `state` receives
     the states found; False where the path does not arrive.
     """
-    if near:
+    if from_near:
         _begin_near(points, work, state)
     else:
         _begin_afar(points, work, g_free, state)

@@ -45,8 +45,8 @@ class Inverse(NamedTuple):
 class Scratch(NamedTuple):
     """What changes and solves work on."""
 
-    rows: np.ndarray  # (BLOCK, m) flexibility between the points that come and those held; rows of the inverse that go
-    left: np.ndarray  # (BLOCK, m) what the inverse makes of them
+    rows: np.ndarray  # (BLOCK, m) flexibility between the points that come and those held
+    left: np.ndarray  # (BLOCK, m) what the inverse makes of them; rows of the inverse that go
     mixed: np.ndarray  # (BLOCK, m)
     small: np.ndarray  # (BLOCK, BLOCK)
     queue: np.ndarray  # (m,) points that wait; released degrees of freedom
