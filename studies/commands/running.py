@@ -155,40 +155,52 @@ def _bar(name: str) -> Iterator[Watch]:
 
 
 @contextmanager
-def _watched(name: str, path: Path) -> Iterator[Watch]:
-    """As `_bar`; what stops the run is told in one line, with how to go on."""
-    runs: list[Run] = []
+def _stops_told(stopped: Callable[[], str], failed: Callable[[OSError], str]) -> Iterator[None]:
+    """What stops a run is told in one line: what is wrong with the study, that it was interrupted, what could not be written."""
     try:
-        with _bar(name) as begin:
-
-            def watch(run: Run) -> Callable[[int], None]:
-                runs.append(run)
-                return begin(run)
-
-            yield watch
+        yield
     except StudyError as error:
         raise refuse(error.mistakes) from None
     except KeyboardInterrupt:
-        console.err.print(f"Stopped; {path} was not written. {_kept(runs)}", markup=False, soft_wrap=True)
+        console.err.print(f"Stopped; {stopped()}", markup=False, soft_wrap=True)
         raise typer.Exit(INTERRUPTED) from None
     except OSError as error:
-        raise refuse([f"{_place(error, path)}: {_why(error)} {_kept(runs)}"]) from None
+        raise refuse([failed(error)]) from None
+
+
+@contextmanager
+def _watched(name: str, path: Path) -> Iterator[Watch]:
+    """As `_bar`; what stops the run is told with how to go on."""
+    runs: list[Run] = []
+
+    def stopped() -> str:
+        return f"{path} was not written. {_kept(runs)}"
+
+    def failed(error: OSError) -> str:
+        return f"{_place(error, path)}: {_why(error)} {_kept(runs)}"
+
+    with _stops_told(stopped, failed), _bar(name) as begin:
+
+        def watch(run: Run) -> Callable[[int], None]:
+            runs.append(run)
+            return begin(run)
+
+        yield watch
 
 
 def rerun(path: Path, workers: Workers) -> None:
     """Repeat the study of a results file and say whether the results are the same."""
     with opened_results(path) as ds:
         name = str(ds.attrs["study_name"])
-    try:
-        with _bar(name) as begin:
-            found = repeat(path, workers, begin)
-    except StudyError as error:
-        raise refuse(error.mistakes) from None
-    except KeyboardInterrupt:
-        console.err.print(f"Stopped; nothing is said of {path}.", markup=False, soft_wrap=True)
-        raise typer.Exit(INTERRUPTED) from None
-    except OSError as error:
-        raise refuse([f"{error.filename or path}: {_why(error)}"]) from None
+
+    def stopped() -> str:
+        return f"nothing is said of {path}."
+
+    def failed(error: OSError) -> str:
+        return f"{error.filename or path}: {_why(error)}"
+
+    with _stops_told(stopped, failed), _bar(name) as begin:
+        found = repeat(path, workers, begin)
     for line in found.in_words():
         say(line)
     raise typer.Exit(DONE if found.agrees else SOME_FAILED)
