@@ -59,13 +59,13 @@ def residual(g_free, g, Gl):
 
 
 @kernel
-def _forces_wanted(points, kept, source, with_slip, n_released):
-    """Forces of the points held, for gaps `source`, less the slip at the first solve, into kept.answer."""
+def _forces_wanted(points, kept, with_slip, n_released):
+    """Forces of the points held, for what the gaps lack (less the slip, at the first solve), into kept.answer."""
     inverse, x = kept.inverse, kept.wanted
     for k in range(inverse.size[0]):
         p = inverse.point[k]
-        x[2 * k] = source[2 * p]
-        x[2 * k + 1] = source[2 * p + 1] - (points.slip[p] if with_slip else 0.0)
+        x[2 * k] = kept.missing[2 * p]
+        x[2 * k + 1] = kept.missing[2 * p + 1] - (points.slip[p] if with_slip else 0.0)
     multiplied(inverse.matrix, 2 * inverse.size[0], x, kept.answer)
     released_forces(inverse, n_released, kept.work, kept.answer)
 
@@ -108,7 +108,7 @@ def solution(points, kept, state, n_released, g_free, g, lam):
         else:
             for i in range(g.shape[0]):
                 kept.missing[i] = g_free[i] - kept.product[i] - g[i]
-        _forces_wanted(points, kept, kept.missing, attempt == 0, n_released)
+        _forces_wanted(points, kept, attempt == 0, n_released)
         _take(points, kept.inverse, state, kept.answer, attempt > 0, g, lam)
         product(points.G, lam, kept.product)
         _free_gaps(g_free, kept.product, state, g)
