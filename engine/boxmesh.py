@@ -13,7 +13,7 @@ import numpy as np
 
 from .bisection import refined
 from .mesh import SIDES, Flags, Floats, Ints, Mesh, compacted
-from .spec import Box, Layer, MeshOptions, Spec
+from .spec import SAME_LINE, Box, Layer, MeshOptions, Spec
 from .walls import with_sections
 
 SLIVER = 0.25
@@ -168,7 +168,7 @@ def _depth_lines(spec: Spec) -> tuple[Floats, int, int]:
     bounds = [layer.bottom for layer in spec.layer[:-1]]
     above = _breaks([0.0, roof], bounds)
     inside = _breaks([roof, roof + box.wall, roof + box.height / 2, floor - box.wall, floor], bounds)
-    below = [floor, *(z for z in bounds if z > floor * (1 + 1e-9))]
+    below = [floor, *(z for z in bounds if z > floor * (1 + SAME_LINE))]
     upper = [0.0] + [d for a, b in pairwise(sorted(roof - z for z in above)) for d in upright.between(a, b)]
     lower = _down_to(spec.domain.depth - floor, [z - floor for z in below], upright)
     middle = [z for a, b in pairwise(inside) for z in np.linspace(a, b, 1 + _box_elements(a, b, box, options))[1:]]
@@ -201,7 +201,7 @@ def _box_elements(top: float, bottom: float, box: Box, options: MeshOptions) -> 
 
 def _breaks(fixed: list[float], bounds: list[float]) -> list[float]:
     """Fixed lines and the layer boundaries between the first and the last of them; those that coincide count once."""
-    near = 1e-9 * max(fixed)
+    near = SAME_LINE * max(fixed)
     inner = [z for z in bounds if fixed[0] < z < fixed[-1] and all(abs(z - line) > near for line in fixed)]
     return sorted({*fixed, *inner})
 

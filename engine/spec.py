@@ -301,7 +301,7 @@ def _about(mesh: MeshOptions, largest: float, length: float) -> float:
 
 
 SAME_LINE = 1e-9
-"""Of the domain's depth: lines of the mesh that lie closer together are one."""
+"""Of their depth: a layer's boundary that lies closer to a line of the box is one with it."""
 
 THINNEST = 1e-4
 """Of mesh.first: thinner strips of elements are slivers, whose stiffness drowns that of all others."""
@@ -311,17 +311,25 @@ def _slivers(spec: Spec) -> Any:
     """Horizontal lines of the mesh that neither coincide nor leave room for elements between them."""
     box, least = spec.box, THINNEST * spec.mesh.first
     floor = box.depth + box.height
-    named = [(0.0, "the surface"), (spec.domain.depth, "the base")]
+    named = [
+        (0.0, "the surface"),
+        (spec.domain.depth, "the base"),
+        (box.depth + box.height / 2, "the middle of the box's height"),
+    ]
     named += [(box.depth, "the top of the roof"), (box.depth + box.wall, "the underside of the roof")]
     named += [(floor - box.wall, "the top of the floor"), (floor, "the underside of the floor")]
-    for i, layer in enumerate(spec.layer):
+    bottoms = [layer.bottom for layer in spec.layer[:-1] if layer.bottom < spec.domain.depth]
+    for i, bottom in enumerate(bottoms, start=1):
         for depth, name in named:
-            off = abs(layer.bottom - depth)
-            if SAME_LINE * spec.domain.depth < off < least:
-                at = f"layer.{i + 1}.bottom = {layer.bottom!r} m"
+            off = abs(bottom - depth)
+            if SAME_LINE * floor < off < least:
+                at = f"layer.{i}.bottom = {bottom!r} m"
                 yield f"{at}: lies {off:.2g} m beside {name}, at {depth:g} m; must be on it or {least:g} m or more away"
+    for i, (above, below) in enumerate(pairwise(bottoms), start=2):
+        if 0 < below - above < least:
+            yield f"layer.{i}.bottom = {below!r} m: makes a layer of {below - above:.2g} m; must be {least:g} m thick or more"
     for what, off in (("surface", box.depth), ("base", spec.domain.depth - floor)):
-        if SAME_LINE * spec.domain.depth < off < least:
+        if 0 < off < least:
             yield f"box.depth = {box.depth!r} m: leaves {off:.2g} m of ground to the {what}; must be {least:g} m or more"
 
 

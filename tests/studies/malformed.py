@@ -131,6 +131,16 @@ FILES = [
         ("layer.1.bottom", "4.000001 m", "lies 1e-06 m beside the top of the roof, at 4 m; must be on it"),
     ),
     bad(
+        "layer that ends a hair above the middle of the box",
+        f'[[layer]]\nbottom = "5.999999 m"\n{LAYER}[[layer]]\nbottom = "14 m"\n{LAYER}',
+        ("layer.1.bottom", "5.999999 m", "lies 1e-06 m beside the middle of the box's height, at 6 m; must be on it"),
+    ),
+    bad(
+        "layer as thick as a hair",
+        f'[[layer]]\nbottom = "2 m"\n{LAYER}[[layer]]\nbottom = "2.00001 m"\n{LAYER}[[layer]]\nbottom = "14 m"\n{LAYER}',
+        ("layer.2.bottom", "2.00001 m", "makes a layer of 1e-05 m; must be 0.0001 m thick or more"),
+    ),
+    bad(
         "box a hair below the surface",
         '[box]\ndepth = "1e-6 m"\nheight = "5.3 m"',
         ("box.depth", "1e-06 m", "leaves 1e-06 m of ground to the surface"),
