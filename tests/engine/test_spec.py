@@ -347,7 +347,7 @@ def test_all_rules_between_fields_are_reported_at_once():
         {"mesh": MeshOptions(order=1, mass="lumped"), "joint": Joint(quadrature="one-point")},
         {"mesh": MeshOptions(corner_levels=0), "output": Output(sections=3)},
         {"layer": soft(100.0)},
-        {"layer": soft(4.0 + 1e-12, 6.0001, 14.0 - 1e-6)},  # on the roof's line, far enough from the middle; the last one goes on
+        {"layer": soft(4.0 + 1e-12, 6.001, 14.0 - 1e-6)},  # on the roof's line, far enough from the middle; the last one goes on
     ],
 )
 def test_what_lies_just_inside_the_rules_is_a_model(given):
