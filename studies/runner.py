@@ -17,9 +17,10 @@ from engine import Status, compile_kernels
 
 from .batch import Job, Progress
 from .cluster import Cluster, ClusterError
-from .dataset import COMPRESSED, Part, build_dataset, write_dataset_of
+from .dataset import build_dataset, write_dataset_of
 from .domain_size import with_convergence
 from .files import clear_parts, whole
+from .merge import COMPRESSED, Part
 from .messages import StudyError
 from .plan import Batch, Study, load_study
 from .pool import Broken, Crew, StartError, out_of_memory

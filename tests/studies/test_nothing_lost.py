@@ -14,7 +14,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from engine import Status
-from studies import dataset, run_study, runner
+from studies import dataset, merge, run_study, runner
 from studies.__main__ import app
 from studies.batch import Job
 from studies.runner import run_into
@@ -115,25 +115,25 @@ def test_slabs_and_chunks_change_nothing(slab, tmp_path, monkeypatch):
     expected = run_study(study, workers=1)
     assert expected["base_acceleration"].dims == ("scale", "time", "component")
     assert expected["mesh_node_x"].dims == ("roof_elements", "node")
-    monkeypatch.setattr(dataset, "SLAB_BYTES", slab)
-    monkeypatch.setattr(dataset, "CHUNK_BYTES", slab // 4)
+    monkeypatch.setattr(merge, "SLAB_BYTES", slab)
+    monkeypatch.setattr(merge, "CHUNK_BYTES", slab // 4)
     run_into(tmp_path / "x.nc", study, 1, lambda run: lambda steps: None)
     assert_is(expected, tmp_path / "x.nc")
 
 
 def test_memory_of_a_merge_does_not_see_the_number_of_cases(monkeypatch, two_ds, tmp_path):
     """No slab has more cases than fit, whatever the axes."""
-    monkeypatch.setattr(dataset, "SLAB_BYTES", 100_000)
+    monkeypatch.setattr(merge, "SLAB_BYTES", 100_000)
     study = study_of(f"{SHORT}[sweep]\np0 = {{ from = 0, to = '4 MPa', num = 7 }}\nscale = [1, 2, 3]\n")
     sizes = []
-    merged = dataset.Merge._merged
+    merged = merge.Merge._merged
 
     def measured(self, cases):
         block = merged(self, cases)
         sizes.append(sum(array.nbytes for array in block.values()))
         return block
 
-    monkeypatch.setattr(dataset.Merge, "_merged", measured)
+    monkeypatch.setattr(merge.Merge, "_merged", measured)
     run_study(study, workers=1)
     assert len(sizes) > 3
     assert max(sizes) <= 100_000
@@ -217,16 +217,21 @@ def test_a_stopped_run_keeps_what_is_done_and_says_how_to_go_on(sign, folder):
     while process.poll() is None and not (journal.exists() and journal.read_text().count("begun") >= 3):
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGINT) if sign == "SIGINT" else process.terminate()
-    said, complaints = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert said == ""
-    done = len(list(journal.parent.glob("*.npz")))
-    kept = f"{done} of 4 batches are in results/long.batches; the same command goes on from there."
-    assert complaints.splitlines()[-1] == f"Stopped; results/long.nc was not written. {kept}"
-    assert done >= 1
+    assert_says_how_to_go_on(process, journal.parent)
     assert not list(folder.rglob("*.part"))
     while is_there(process.pid):  # multiprocessing's own watchman takes a moment
         time.sleep(0.01)
+
+
+def assert_says_how_to_go_on(process, folder):
+    """A stopped run of `LONG` says nothing but how many of its batches are in the folder."""
+    said, complaints = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said == ""
+    done = len(list(folder.glob("*.npz")))
+    kept = f"{done} of 4 batches are in results/long.batches; the same command goes on from there."
+    assert complaints.splitlines()[-1] == f"Stopped; results/long.nc was not written. {kept}"
+    assert done >= 1
 
 
 def is_there(group):
