@@ -4,7 +4,6 @@ The cluster is started within its seconds, as the pool is, and sends histories t
 """
 
 import time
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -36,8 +35,7 @@ class Pair:
 
 def thousand() -> Study:
     """The large study with two frictions and every tenth step kept."""
-    table = tomllib.loads(large.FILE.read_text(encoding="utf-8"))
-    table["sweep"]["layer.3.friction"]["num"] = 2
+    table = large.table_of(frictions=2)
     table["output"]["every"] = EVERY
     return make_study(table, "thousand")
 

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -72,10 +73,14 @@ class Large:
 
 def study_of(frictions: int = FRICTIONS) -> Study:
     """The study with so many values of the friction, 500 cases each."""
-    text = FILE.read_text(encoding="utf-8")
-    table = tomllib.loads(text)
+    return make_study(table_of(frictions), FILE.stem, FILE.read_text(encoding="utf-8"), FILE.parent, FILE.name)
+
+
+def table_of(frictions: int) -> dict[str, Any]:
+    """The study file with so many values of the friction."""
+    table = tomllib.loads(FILE.read_text(encoding="utf-8"))
     table["sweep"]["layer.3.friction"]["num"] = frictions
-    return make_study(table, FILE.stem, text, FILE.parent, FILE.name)
+    return table
 
 
 def measured(frictions: int) -> Large:

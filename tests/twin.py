@@ -18,6 +18,9 @@ Step = namedtuple("Step", "where error own states halved")
 """One compared step: its error, and where that is beyond STEP the error of the reference when it starts from the engine's
 solution: within STEP, that is another solution of the same equations."""
 
+Marched = namedtuple("Marched", "k before after halved stepper state")
+"""A step of the engine: its number, the moments of all lanes before and after, which were halved, and what made it."""
+
 
 def twin_of(system, material_list, held, quadrature, lumped=False, thickness=1.0):
     """Reference of a system, matched by the nodes that its degrees of freedom are and by the rows of its joint operator."""
@@ -101,26 +104,31 @@ def compare(model, twin, spec, where, before, after, standing, ground, halved):
     return Step(where, error, own, set(after.state), halved)
 
 
-def compared_steps(model, specs, motions, instants, label):
-    """March cases from their static state, comparing a step of each at several instants.
+def marched(model, twin, lanes, loads, n, last):
+    """The engine's steps to the `last` of the first n lanes, from their static state; each is a Marched.
 
     A case for which the engine finds no static state starts at rest, with its loads applied at once.
     """
-    twin, (lanes, loads) = twin_of_model(model), lanes_of(model, specs, motions)
     state, found = equilibrium(model.system, lanes, loads, model.frequencies[0])
     for lane in np.flatnonzero(~found):
         state.put(int(lane), State.at_rest(model.system))
     stepper, ground = Stepper(model.system, newmark_of(model.spec), model.rayleigh), lanes.ground
     stepper.start(state, lanes, ground[0])
-    result = []
-    for k in range(1, max(instants) + 1):
-        before = [moment(state, twin, lane) for lane in range(len(specs))]
+    for k in range(1, min(last, len(ground) - 1) + 1):
+        before = [moment(state, twin, lane) for lane in range(n)]
         halved = stepper.step(state, lanes, ground[k - 1], ground[k])
+        yield Marched(k, before, [moment(state, twin, lane) for lane in range(n)], halved, stepper, state)
+
+
+def compared_steps(model, specs, motions, instants, label):
+    """March cases from their static state, comparing a step of each at several instants."""
+    twin, (lanes, loads) = twin_of_model(model), lanes_of(model, specs, motions)
+    result = []
+    for k, before, after, halved, stepper, _ in marched(model, twin, lanes, loads, len(specs), max(instants)):
         for lane, spec in enumerate(specs):
             where = f"{label}, case {lane}, step {k}"
             assert stepper.of.report.rounds[lane] > 0, f"{where}: not solved even in parts of dt/64"
             if k in instants:
-                standing, ends = lanes.standing[twin.column, lane], ground[k - 1 : k + 1, :, lane]
-                after = moment(state, twin, lane)
-                result.append(compare(model, twin, spec, where, before[lane], after, standing, ends, bool(halved[lane])))
+                standing, ends = lanes.standing[twin.column, lane], lanes.ground[k - 1 : k + 1, :, lane]
+                result.append(compare(model, twin, spec, where, before[lane], after[lane], standing, ends, bool(halved[lane])))
     return result

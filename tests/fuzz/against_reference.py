@@ -5,10 +5,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from engine import Lanes, Model, Spec, State, Stepper, equilibrium, newmark_of
+from engine import Lanes, Model, Spec, State, Stepper, newmark_of
 from tests import reference
 from tests.fuzz.checks import SOLVING, UNIT
-from tests.twin import STEP, Twin, lanes_of, moment, reference_step, step_error, twin_of_model
+from tests.twin import STEP, Twin, lanes_of, marched, reference_step, step_error, twin_of_model
 
 
 class Verdict(StrEnum):
@@ -29,23 +29,17 @@ missed."""
 def told_steps(model: Model, specs: list[Spec], motions: list[np.ndarray], instants: tuple[int, ...]) -> list[Told]:
     """March the cases from their static state, and judge the steps that end at `instants` (those that there are).
 
-    A case without static state starts at rest, its loads applied at once. A step that no halving solves is the engine's own word.
+    A step that no halving solves is the engine's own word.
     """
     twin, (lanes, loads) = twin_of_model(model), lanes_of(model, specs, motions)
-    state, found = equilibrium(model.system, lanes, loads, model.frequencies[0])
-    for lane in np.flatnonzero(~found):
-        state.put(int(lane), State.at_rest(model.system))
-    stepper, ground = Stepper(model.system, newmark_of(model.spec), model.rayleigh), lanes.ground
-    stepper.start(state, lanes, ground[0])
-    told, n = [], len(specs)
-    for k in range(1, min(max(instants), len(ground) - 1) + 1):
-        before = [moment(state, twin, lane) for lane in range(n)]
-        halved, report = stepper.step(state, lanes, ground[k - 1], ground[k]), stepper.of.report
-        for lane in range(n) if k in instants else ():
+    told = []
+    for k, before, after, halved, stepper, state in marched(model, twin, lanes, loads, len(specs), max(instants)):
+        report = stepper.of.report
+        for lane in range(len(specs)) if k in instants else ():
             if report.rounds[lane] > 0:
-                ends = ground[k - 1 : k + 1, :, lane]
+                ends = lanes.ground[k - 1 : k + 1, :, lane]
                 missed = report.residual[lane] * _size_of_gaps(state, stepper, lane)
-                around = Around(before[lane], moment(state, twin, lane), ends, lane, bool(halved[lane]), missed)
+                around = Around(before[lane], after[lane], ends, lane, bool(halved[lane]), missed)
                 told.append(Told(f"case {lane}, step {k}", *_verdict(model, twin, lanes, specs[lane], around)))
     return told
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from studies import Study, make_study, run_study, write_dataset
+from engine import Model, Spec
+from studies import Study, batch, make_study, run_study, write_dataset
 
 COARSE = """
 [motion]
@@ -71,3 +72,16 @@ def reopened(quick_file: Path) -> xr.Dataset:
 def failing_ds() -> xr.Dataset:
     """Two cases, the second without static equilibrium."""
     return run_study(study_of(FAILING), workers=1)
+
+
+@pytest.fixture
+def too_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """There is no room for the meshes of cases with a damping ratio of 0.05."""
+    built = batch.build_model
+
+    def build(spec: Spec) -> Model:
+        if spec.damping.ratio == 0.05:
+            raise MemoryError("no room for the mesh")
+        return built(spec)
+
+    monkeypatch.setattr(batch, "build_model", build)

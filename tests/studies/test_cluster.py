@@ -21,8 +21,8 @@ from studies.provenance import computer
 from studies.runner import run_into
 
 from .conftest import SHORT, study_of
-from .test_nothing_lost import LONG, TWO, assert_is, manifest, poisoned
-from .test_pool import doubled
+from .deeds import doubled, worked
+from .test_nothing_lost import LONG, TWO, assert_is, assert_says_how_to_go_on, manifest, poisoned
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
 
@@ -112,33 +112,14 @@ def test_a_stopped_run_keeps_what_is_done_and_says_how_to_go_on(scheduler, tmp_p
     while process.poll() is None and not (journal.exists() and "ended" in journal.read_text()):
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
-    said, complaints = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert said == ""
-    done = len(list(journal.parent.glob("*.npz")))
-    kept = f"{done} of 4 batches are in results/long.batches; the same command goes on from there."
-    assert complaints.splitlines()[-1] == f"Stopped; results/long.nc was not written. {kept}"
-    assert done >= 1
+    assert_says_how_to_go_on(process, journal.parent)
 
 
 # one task -----------------------------------------------------------------------------------------------------------------------
 
 
-def worked(scheduler, tasks, patience=600.0):
-    """Answers by task, and progress by task, of the workers of a scheduler that get all of these."""
-    found, told, left = {}, Counter(), list(tasks)
-    with Cluster(scheduler, doubled, patience) as crew:
-        while left or crew.busy:
-            while left and crew.free:
-                task = left.pop(0)
-                crew.give(task, task)
-            for task, answer in crew.answers(lambda task, steps: told.update({task: steps})):
-                found[task] = answer
-    return found, told
-
-
 def test_every_task_gets_its_answer_and_tells_its_progress(scheduler):
-    found, told = worked(scheduler, [1, 2, 3, "memory", "disk", 4, "threads"])
+    found, told = worked(Cluster(scheduler, doubled), [1, 2, 3, "memory", "disk", 4, "threads"])
     assert found == {
         **{task: 2 * task for task in (1, 2, 3, 4)},
         "memory": Broken("ran out of memory: no room for the mesh"),
@@ -202,12 +183,12 @@ def is_profiled(dask_worker):
 
 def test_a_task_that_a_worker_cannot_unpack_is_lost(scheduler, monkeypatch):
     monkeypatch.setattr(cluster.pickle, "dumps", lambda task: b"no pickle")
-    assert worked(scheduler, ["task"])[0]["task"].reason.startswith("met UnpicklingError: ")
+    assert worked(Cluster(scheduler, doubled), ["task"])[0]["task"].reason.startswith("met UnpicklingError: ")
 
 
 def test_a_worker_that_hangs_is_started_anew(scheduler):
     before = set(pids(scheduler))
-    found, _ = worked(scheduler, ["hung", 1, 2], patience=3.0)
+    found, _ = worked(Cluster(scheduler, doubled, 3.0), ["hung", 1, 2])
     assert found == {"hung": Broken("gave no sign of life for 3 s"), 1: 2, 2: 4}
     while len(now := set(pids(scheduler))) < 2:
         time.sleep(0.05)
@@ -226,7 +207,7 @@ def test_workers_with_other_versions_are_named(scheduler, monkeypatch, caplog):
     monkeypatch.setattr(cluster, "computer", lambda: computer() | {"numpy": "0.1"})
     said = rf"worker tcp://\S+: would compute other bits: numpy {re.escape(computer()['numpy'])}, here 0.1"
     with pytest.raises(ClusterError, match=f"^{said}$"):
-        worked(scheduler, [1])
+        worked(Cluster(scheduler, doubled), [1])
     assert [bool(re.fullmatch(f"{said}; it is left out", line)) for line in complaints(caplog)] == [True]
 
 
@@ -235,7 +216,7 @@ def test_a_worker_of_several_threads_is_refused():
         local(n_workers=1, threads_per_worker=2, processes=False) as there,
         pytest.raises(ClusterError, match=r"has 2 threads, must have one \(dask worker --nthreads 1\)$"),
     ):
-        worked(there.scheduler_address, [1])
+        worked(Cluster(there.scheduler_address, doubled), [1])
 
 
 def test_a_scheduler_that_goes_is_told(caplog):

@@ -1,7 +1,6 @@
 """Processes that compute: what one of them loses, and that the others do not notice."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -13,43 +12,13 @@ import pytest
 from studies import pool
 from studies.pool import ONE_THREAD, Broken, Crew, StartError
 
+from .deeds import doubled, worked
 from .poison import Poison
-
-
-def doubled(task, progress):
-    """What the processes compute here: twice a number, or the deed that is named."""
-    progress(1)
-    if task == "killed":
-        os.kill(os.getpid(), signal.SIGKILL)
-    if task == "ended":
-        os._exit(3)
-    if task == "hung":
-        time.sleep(1000)
-    if task == "memory":
-        raise MemoryError("no room for the mesh")
-    if task == "disk":
-        raise OSError(28, "No space left on device", "x.npz")
-    if task == "threads":
-        return [os.environ[name] for name in ONE_THREAD]
-    return 2 * task
-
-
-def worked(size, tasks, patience=600.0, function=doubled):
-    """Answers by task, and progress by task, of a crew that gets all of these."""
-    found, told, left = {}, Counter(), list(tasks)
-    with Crew(size, function, patience) as crew:
-        while left or crew.busy:
-            while left and crew.free:
-                task = left.pop(0)
-                crew.give(task, task)
-            for task, answer in crew.answers(lambda task, steps: told.update({task: steps})):
-                found[task] = answer
-    return found, told
 
 
 def test_every_task_gets_its_answer_and_tells_its_progress():
     environment = dict(os.environ)
-    found, told = worked(2, range(7))
+    found, told = worked(Crew(2, doubled), range(7))
     assert found == {task: 2 * task for task in range(7)}
     assert told == Counter(range(7))
     assert dict(os.environ) == environment
@@ -57,12 +26,12 @@ def test_every_task_gets_its_answer_and_tells_its_progress():
 
 def test_processes_compute_with_one_thread_each():
     assert set(ONE_THREAD) == {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"}
-    assert worked(1, ["threads"])[0]["threads"] == ["1", "1", "1"]
+    assert worked(Crew(1, doubled), ["threads"])[0]["threads"] == ["1", "1", "1"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no such signals")
 def test_a_process_that_is_lost_loses_its_own_task():
-    found, _ = worked(1, [1, "killed", 2, "ended", 3, "memory", 4])
+    found, _ = worked(Crew(1, doubled), [1, "killed", 2, "ended", 3, "memory", 4])
     assert found == {
         **{task: 2 * task for task in (1, 2, 3, 4)},
         "killed": Broken("was killed (SIGKILL, as the system does where memory runs out)"),
@@ -73,20 +42,22 @@ def test_a_process_that_is_lost_loses_its_own_task():
 
 def test_a_process_that_hangs_is_ended_and_the_others_go_on(monkeypatch):
     monkeypatch.setattr(pool, "TICK", 0.1)
-    found, _ = worked(2, ["hung", 1, 2], patience=3.0)
+    found, _ = worked(Crew(2, doubled, 3.0), ["hung", 1, 2])
     assert found == {"hung": Broken("gave no sign of life for 3 s"), 1: 2, 2: 4}
 
 
 def test_a_full_disk_is_of_no_single_process():
     with pytest.raises(OSError, match="No space left on device") as caught:
-        worked(1, ["disk", 1])
+        worked(Crew(1, doubled), ["disk", 1])
     assert caught.value.filename == "x.npz"
 
 
 def test_processes_that_cannot_start_are_told(tmp_path):
     """Of a script that starts them while it is imported: they would import it too."""
     script = tmp_path / "script.py"
-    script.write_text("from tests.studies.test_pool import worked\nworked(1, [1])\n")
+    script.write_text(
+        "from tests.studies.deeds import doubled, worked\nfrom studies.pool import Crew\nworked(Crew(1, doubled), [1])\n"
+    )
     answer = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=100)
     assert answer.returncode == 1
     assert "StartError: a process that computes ended with exit code 1 at its start" in answer.stderr
@@ -96,7 +67,7 @@ def test_processes_that_cannot_start_are_told(tmp_path):
 def test_processes_that_are_killed_at_their_start_are_not_started_for_ever(monkeypatch):
     monkeypatch.setattr(pool, "MOST_STILLBORN", 2)
     with pytest.raises(StartError, match=r"was killed .* at its start"):
-        worked(1, [1], function=Poison())
+        worked(Crew(1, Poison()), [1])
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc"), reason="asks /proc for the processes")
@@ -104,7 +75,7 @@ def test_processes_end_with_the_one_that_asked(tmp_path):
     """Also where that is killed, so that nothing is written behind the back of the next run."""
     script = tmp_path / "script.py"
     script.write_text(
-        "import multiprocessing as m\nfrom tests.studies.test_pool import Crew, doubled, time\n"
+        "import multiprocessing as m, time\nfrom studies.pool import Crew\nfrom tests.studies.deeds import doubled\n"
         "if __name__ == '__main__':\n    with Crew(1, doubled) as crew:\n"
         "        while not crew.free: list(crew.answers(print))\n"
         "        crew.give(0, 'hung')\n        print(m.active_children()[0].pid, flush=True)\n        time.sleep(1000)\n"

@@ -8,7 +8,7 @@ import xarray as xr
 
 import studies
 from engine import Status
-from studies import batch, run_study, runner, write_dataset
+from studies import run_study, runner, write_dataset
 from studies.batch import Job, run_batch, trace_case
 from studies.plan import Batch
 
@@ -199,16 +199,9 @@ def test_trace_knows_the_case_s_own_model():
 # lost batches ----------------------------------------------------------------------------------------------------------------
 
 
-def test_a_batch_that_cannot_be_built_does_not_stop_the_others(monkeypatch):
+@pytest.mark.usefixtures("too_large")
+def test_a_batch_that_cannot_be_built_does_not_stop_the_others():
     """Failed cases are NaN with status and reason; they never stop a study (DESIGN section 5)."""
-    built = batch.build_model
-
-    def too_large(spec):
-        if spec.damping.ratio == 0.05:
-            raise MemoryError("no room for the mesh")
-        return built(spec)
-
-    monkeypatch.setattr(batch, "build_model", too_large)
     ds = run_study(study_of(TWO_BATCHES), workers=1)
     assert (ds["status"].sel(damping_ratio=0.02) == Status.DONE).all()
     assert (ds["status"].sel(damping_ratio=0.05) >= Status.NOT_CONVERGED).all()

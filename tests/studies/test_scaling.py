@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from engine import Status
-from studies import batch, run_study
+from studies import run_study
 from studies.batch import Job, run_batch
 from studies.plan import Batch
 from studies.scaling import SAME
@@ -199,16 +199,9 @@ def test_a_failed_case_fails_with_all_that_follow_from_it():
     assert_like_one_by_one(study, ds, [True] * 6)
 
 
-def test_a_lost_batch_loses_its_followers_and_says_what_they_were(monkeypatch):
+@pytest.mark.usefixtures("too_large")
+def test_a_lost_batch_loses_its_followers_and_says_what_they_were():
     study = study_of(f'{LIGHT}[sweep]\np0 = ["1 MPa", "2 MPa"]\nscale = [1, 2]\ndamping_ratio = [0.02, 0.05]')
-    built = batch.build_model
-
-    def too_large(spec):
-        if spec.damping.ratio == 0.05:
-            raise MemoryError("no room for the mesh")
-        return built(spec)
-
-    monkeypatch.setattr(batch, "build_model", too_large)
     ds = run_study(study, workers=1)
     assert (ds["status"].sel(damping_ratio=0.05) == Status.WORKER_LOST).all()
     assert (ds["status"].sel(damping_ratio=0.02) == Status.DONE).all()
