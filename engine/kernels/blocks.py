@@ -1,8 +1,15 @@
 """Products of a symmetric matrix with up to BLOCK rows at a time: one pass over it then does the work of four."""
 
-from .jit import kernel, summing_kernel
+from .jit import inlined_kernel, kernel, summing_kernel
 
 BLOCK = 4
+
+
+@kernel
+def copy(x, into):
+    """Write x (n,) over another array; `into[:] = x` would ask for memory in case they overlap."""
+    for i in range(x.size):
+        into[i] = x[i]
 
 
 @summing_kernel
@@ -46,7 +53,7 @@ def multiplied_rows(H, n, rows, result):
         result[0, i], result[1, i], result[2, i], result[3, i] = a, b, c, d
 
 
-@kernel
+@inlined_kernel
 def add_outer(H, n, factor, left, right):
     """H[:n, :n] += factor leftᵀ right, both (BLOCK, m)."""
     for i in range(n):
@@ -55,7 +62,7 @@ def add_outer(H, n, factor, left, right):
             H[i, k] += a * right[0, k] + b * right[1, k] + c * right[2, k] + d * right[3, k]
 
 
-@kernel
+@inlined_kernel
 def mix(n, small, rows, mixed):
     """mixed = small rows over n columns; small (BLOCK, BLOCK)."""
     for q in range(BLOCK):
@@ -81,7 +88,7 @@ def subtract_rows(H, n, chosen, count, factors, x):
         r += 1
 
 
-@kernel
+@inlined_kernel
 def clear(rows, first, n):
     """Zeros into the rows of a block from `first` on."""
     for q in range(first, BLOCK):

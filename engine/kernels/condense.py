@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .blocks import dot, multiplied
+from .blocks import copy, dot, multiplied
 from .clock import ticks
 from .contact import solve_lane, source_test
 from .jit import LANES, inlined_kernel, kernel
@@ -83,8 +83,10 @@ def solve_joints(G, gap_free, law, n_lane, max_rounds, work, slip, found, report
 @kernel
 def take_solution(into, source, lane):
     """Copy what a joint solve finds (gap, forces, state) of one lane."""
-    into.gap[lane], into.force[lane], into.state[lane] = source.gap[lane], source.force[lane], source.state[lane]
-    into.damped[lane] = source.damped[lane]
+    copy(source.gap[lane], into.gap[lane])
+    copy(source.force[lane], into.force[lane])
+    copy(source.damped[lane], into.damped[lane])
+    copy(source.state[lane], into.state[lane])
 
 
 @kernel

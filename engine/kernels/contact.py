@@ -9,10 +9,11 @@ and on from the last sweep, which cannot cycle; twice as many sweeps each time. 
 
 import numpy as np
 
+from .blocks import copy
 from .direct import EQUATION_TOLERANCE, direct
 from .follow import follow
 from .inverse import Inverse, let_go
-from .jit import kernel, summing_kernel
+from .jit import inlined_kernel, kernel, summing_kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, balance, slip_sign
 from .states import Kept, Points
 
@@ -25,7 +26,7 @@ QUIET = 2  # sweeps without another state, after which more of them are not wort
 LONG = 4  # unless they begin to be many: then this part of them, since slow ones come to rest before they arrive
 
 
-@kernel
+@inlined_kernel
 def _next_state(state, closing, gap_n, normal, excess, forward):
     """The state that a solution calls for: `excess` of shear over the Coulomb limit, `forward` part of the slip; `closing` is
     the state of a point that closes."""
@@ -40,7 +41,7 @@ def _next_state(state, closing, gap_n, normal, excess, forward):
     return state
 
 
-@kernel
+@inlined_kernel
 def _revise(points, g, lam, g_tol, lam_tol, state):
     """Replace the states that do not hold; True where all did: no tension, no penetration, the Coulomb limit, slip forward."""
     mu, all_hold = points.mu, True
@@ -68,7 +69,7 @@ def _move(G, p, normal, tangential, force, Gl):
             Gl[j] += more_n * G[n, j] + more_s * G[s, j]
 
 
-@kernel
+@inlined_kernel
 def _project(G, mu, force, Gl):
     """Bring forces back onto the law's cone (D3), for sweeps to start from; G lambda goes along."""
     for p in range(mu.shape[0]):
@@ -91,7 +92,7 @@ def _rounding(G, g_free, lam, product):
     return 0.0 if scale == 0.0 else lam.shape[0] * UNIT_ROUNDOFF * np.sqrt(total / scale)
 
 
-@kernel
+@inlined_kernel
 def _sweep(points, g_free, lam, Gl, proposal):
     """One block Gauss-Seidel sweep over the points: lam, G lambda and the proposed states; whether no state has changed."""
     G, quiet = points.G, True
@@ -107,7 +108,7 @@ def _sweep(points, g_free, lam, Gl, proposal):
     return quiet
 
 
-@kernel
+@inlined_kernel
 def _sweep_on(points, g_free, lam, Gl, proposal, most):
     """Sweeps until the states have stood still for QUIET of them, or a LONG part of `most`; `most` at most."""
     quiet = 0
@@ -117,7 +118,7 @@ def _sweep_on(points, g_free, lam, Gl, proposal, most):
             return
 
 
-@kernel
+@inlined_kernel
 def _largest(x):
     largest = 0.0
     for i in range(x.shape[0]):
@@ -135,8 +136,8 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
     inverse = Inverse(work.matrix[lane], work.point[lane], work.place[lane], work.idle[lane], work.size[lane])
     kept = Kept(inverse, work.work, work.wanted, work.answer, work.product, work.missing)
     proposal, g_tol = work.proposal, STATE_TOLERANCE * _largest(g_free)
-    work.swept[:] = lam
-    proposal[:] = state
+    copy(lam, work.swept)
+    copy(state, proposal)
     residual, sweeps = np.inf, FIRST_SWEEPS
     if not np.isfinite(np.sum(g_free)):
         return -1, np.nan
@@ -144,10 +145,10 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
         residual, _ = direct(points, kept, g_free, proposal, g, lam)
         if not np.isfinite(residual):
             break
-        work.tried[:] = proposal
+        copy(proposal, work.tried)
         held = _revise(points, g, lam, g_tol, STATE_TOLERANCE * _largest(lam), proposal)
         if held and (residual <= EQUATION_TOLERANCE or residual <= _rounding(G, g_free, lam, work.product)):
-            state[:] = work.tried
+            copy(work.tried, state)
             let_go(inverse, state, work.work)
             return attempt, residual
         if attempt == FOLLOW_AFTER:
@@ -156,8 +157,8 @@ def solve_lane(G, g_free, law, lane, slip, state, g, lam, work, max_rounds):
                     break
         elif attempt % NEWTON_ROUNDS == 0 and attempt < max_rounds:
             if attempt % (2 * NEWTON_ROUNDS) != 0:
-                work.swept[:] = lam
-                work.swept_product[:] = work.product
+                copy(lam, work.swept)
+                copy(work.product, work.swept_product)
                 _project(G, points.mu, work.swept, work.swept_product)
             _sweep_on(points, g_free, work.swept, work.swept_product, proposal, sweeps)
             sweeps *= 2

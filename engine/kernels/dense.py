@@ -1,6 +1,6 @@
 """LU with partial pivoting of one small dense matrix, in a fixed order of sums."""
 
-from .jit import kernel, summing_kernel
+from .jit import inlined_kernel, kernel, summing_kernel
 from .vector import load, plus_product, store, zeros
 
 PANEL = 4
@@ -25,7 +25,7 @@ def factorise(A, n, pivot):
     return True
 
 
-@kernel
+@inlined_kernel
 def _pivoted(A, n, k, pivot):
     """Bring the largest entry of column k onto the diagonal and divide what is below by it; False where all are zero."""
     best = k

@@ -7,9 +7,9 @@ is built anew where its rounding shows, or where the states are all new.
 
 import numpy as np
 
-from .blocks import multiplied
+from .blocks import copy, multiplied
 from .inverse import build, hold
-from .jit import kernel, summing_kernel
+from .jit import inlined_kernel, kernel, summing_kernel
 from .joint import OPEN, STICK
 from .release import release, released_forces, tie
 
@@ -58,7 +58,7 @@ def residual(g_free, g, Gl):
     return (0.0 if scale == 0.0 else np.sqrt(worst / scale)), (0.0 if gaps == 0.0 else np.sqrt(worst / gaps))
 
 
-@kernel
+@inlined_kernel
 def _forces_wanted(points, kept, with_slip, n_released):
     """Forces of the points held, for what the gaps lack (less the slip, at the first solve), into kept.answer."""
     inverse, x = kept.inverse, kept.wanted
@@ -70,7 +70,7 @@ def _forces_wanted(points, kept, with_slip, n_released):
     released_forces(inverse, n_released, kept.work, kept.answer)
 
 
-@kernel
+@inlined_kernel
 def _take(points, inverse, state, force, add, g, lam):
     """Forces found into lam (`add` corrects those there), just as the states want them, and gaps of closed points into g."""
     for p in range(state.shape[0]):
@@ -87,7 +87,7 @@ def _take(points, inverse, state, force, add, g, lam):
             lam[s] = -tie(points, state[p], p) * lam[n]
 
 
-@kernel
+@inlined_kernel
 def _free_gaps(g_free, Gl, state, g):
     """Gaps that follow from the forces: both of open points, the tangential one of sliding points."""
     for p in range(state.shape[0]):
@@ -104,7 +104,7 @@ def solution(points, kept, state, n_released, g_free, g, lam):
     for attempt in range(PASSES):
         before = found
         if attempt == 0:
-            kept.missing[:] = g_free
+            copy(g_free, kept.missing)
         else:
             for i in range(g.shape[0]):
                 kept.missing[i] = g_free[i] - kept.product[i] - g[i]

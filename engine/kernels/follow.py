@@ -10,7 +10,7 @@ away. Exact ties are not treated.
 import numpy as np
 
 from .direct import direct, product, solution
-from .jit import kernel
+from .jit import inlined_kernel, kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, respond, slip_sign
 
 MAX_PIECES = 40
@@ -33,7 +33,7 @@ def _margin(points, p, to, state, g, lam):
     return slip_sign(state) * (g[s] - lam[s] / points.k_s[p] - points.slip[p])
 
 
-@kernel
+@inlined_kernel
 def _borders(state, mu):
     """The states next to `state`, -1 where there is none: an open point closes sliding, a sticking one slides first."""
     if state == OPEN:
@@ -43,7 +43,7 @@ def _borders(state, mu):
     return OPEN, (STICK if mu > 0.0 else -1)
 
 
-@kernel
+@inlined_kernel
 def _begin_near(points, work, state):
     """Gaps of the last step, the sliding points a little within friction, as the start of a path."""
     for p in range(state.shape[0]):
@@ -58,7 +58,7 @@ def _begin_near(points, work, state):
         work.far[i] += work.far_gap[i]
 
 
-@kernel
+@inlined_kernel
 def _begin_afar(points, work, g_free, state):
     """All points open, g_free pushed apart, as the start of a path."""
     size = 0.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from .blocks import BLOCK, add_outer, clear, dot, invert_small, mix, multiplied_rows
 from .dense import factorise, solve_lanes
-from .jit import LANES, kernel
+from .jit import LANES, inlined_kernel, kernel
 from .joint import OPEN
 
 PAIR = BLOCK // 2
@@ -80,7 +80,7 @@ def _flexibilities(points, inverse, i, row):
         row[2 * k], row[2 * k + 1] = _flexibility(points, i, n), _flexibility(points, i, s)
 
 
-@kernel
+@inlined_kernel
 def _compliance(points, i):
     """Of the joint itself at degree of freedom i."""
     return 1.0 / (points.k_s[i // 2] if i % 2 == 1 else points.k_n[i // 2])
@@ -134,7 +134,7 @@ def _remove(inverse, going, work):
     return True
 
 
-@kernel
+@inlined_kernel
 def _close_up(inverse, p):
     """Give the place of point p to the last one."""
     k, last, H = inverse.place[p], inverse.size[0] - 1, inverse.matrix

@@ -13,9 +13,10 @@ import numba
 LANES = 16
 """Cases that march together. Every lane array is (rows, LANES) with the lane contiguous; short batches are padded."""
 
-FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
-"""`contract` lets a product and a sum become one fused operation, the same one in every lane; nothing is reassociated and
-NaN and infinity keep their meaning."""
+FLAGS: dict[str, Any] = {"nogil": True, "_nrt": False, "error_model": "numpy", "fastmath": {"contract"}}
+"""Without numba's runtime (`_nrt`) a kernel can neither make an array nor write one over another (`blocks.copy` does), and nobody
+counts who uses which: half of the time of a small joint solve. `contract` lets a product and a sum become one fused operation,
+the same one in every lane; nothing is reassociated and NaN and infinity keep their meaning."""
 
 SUMMING = {"contract", "reassoc"}
 """For kernels of one lane whose long sums would wait for every addition: partial sums run side by side, in an order that the
@@ -67,8 +68,16 @@ def summing_kernel(function: Callable) -> Callable:
 
 
 def inlined_kernel(function: Callable) -> Callable:
-    """A `kernel` that becomes part of the one that calls it: an outer one else takes all below it through the compiler again."""
+    """A `kernel` that becomes part of the one that calls it: an outer one else takes all below it through the compiler again.
+
+    For what is called in one place, by a function of moderate size: numba's time grows like the square of a large one.
+    """
     return _compiled(function, FLAGS | {"inline": "always"})
+
+
+def allocating_kernel(function: Callable) -> Callable:
+    """A `kernel` that may make arrays of its own."""
+    return _compiled(function, FLAGS | {"_nrt": True})
 
 
 def _compiled(function: Callable, flags: dict[str, Any]) -> Callable:

@@ -7,7 +7,7 @@ no shear.
 
 import numpy as np
 
-from .jit import kernel
+from .jit import inlined_kernel, kernel
 
 OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD = 0, 1, 2, 3
 """States of a point; forward is the slip that grows with g_s, resisted by a positive lambda_s. A closed point without friction
@@ -50,7 +50,7 @@ def tangent(state, k_n, k_s, mu, T):
         T[1, 0] = -slip_sign(state) * mu * k_n
 
 
-@kernel
+@inlined_kernel
 def slip_after(state, gap_s, shear, slip, k_s):
     """Slip at the end of a step (D3): kept where the point sticks, carried along where it slides or is open."""
     if state == STICK:
@@ -60,7 +60,7 @@ def slip_after(state, gap_s, shear, slip, k_s):
     return gap_s - shear / k_s
 
 
-@kernel
+@inlined_kernel
 def balance(G_nn, G_ns, G_ss, r_n, r_s, slip, k_n, k_s, mu):
     """Solve g + G lambda(g) = r at one point with all others held: (state, lambda_n, lambda_s).
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import LANES, kernel
+from .blocks import copy
+from .jit import LANES, inlined_kernel, kernel
 from .joint import slip_after
 from .sparse import Rows, row_product
 from .vector import load, plus_product, store, zeros
@@ -84,7 +85,7 @@ class Start(NamedTuple):
     joints: np.ndarray
 
 
-@kernel
+@inlined_kernel
 def known_part(rates):
     """Factors of u, v, a in q, the part of u⁺ that is known before the step."""
     share = rates.beta / (1.0 + rates.a1 * rates.beta)
@@ -131,7 +132,7 @@ def commit(rates, matrices, loads, ground, motion, step, energy):
     store(energy, DAMPING, work)
 
 
-@kernel
+@inlined_kernel
 def _advance(rates, loads, ground, motion, step, energy):
     """u, v, a at the end of the step (D6); step.y becomes the displacement in it, step.mean mean velocity, step.w the next w."""
     qu, qv, qa = known_part(rates)
@@ -176,10 +177,10 @@ def commit_joints(law, n_lane, found, contact, energy):
             energy[JOINT_DAMPING, lane] += 0.5 * (contact.damped[lane, i] + damped) * step
             contact.gap[lane, i], contact.force[lane, i], contact.damped[lane, i] = gap, force, damped
         energy[JOINT_ELASTIC, lane] = elastic
-        contact.state[lane] = found.state[lane]
+        copy(found.state[lane], contact.state[lane])
 
 
-@kernel
+@inlined_kernel
 def _kinetic(M, v, result):
     """result = 1/2 vᵀ M v of every lane: v (n, LANES), result (1, LANES)."""
     total = zeros()
@@ -188,7 +189,7 @@ def _kinetic(M, v, result):
     store(result, 0, plus_product(zeros(), 0.5, total))
 
 
-@kernel
+@inlined_kernel
 def _strain_change(K, u, start, change, result):
     """result (1, LANES) = 1/2 uᵀ K u less what it was at the start, from the difference of u: that is not lost in rounding."""
     for i in range(u.shape[0]):

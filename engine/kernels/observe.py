@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .blocks import copy
 from .jit import LANES, inlined_kernel, kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD
 from .march import FRICTION
@@ -174,8 +175,8 @@ def see_values(of, time, motion, contact):
     product(of.operator, motion.u, of.values)
     for c in range(LANES):
         if abs(of.values[of.racking, c]) > of.peaks[0, of.racking, c]:
-            of.shape[:, c] = motion.u[:, c]
-            of.shape_state[c] = contact.state[c]
+            copy(motion.u[:, c], of.shape[:, c])
+            copy(contact.state[c], of.shape_state[c])
             of.shape_time[c] = time
     observe(of.values, of.static, of.peaks)
     observe_principal(of.values, of.stresses, of.principal.shape[1], of.principal)

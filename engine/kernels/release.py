@@ -7,17 +7,17 @@ sliding one just the shear that friction allows, lambda_s + tie lambda_n = 0. Th
 
 from .blocks import subtract_rows
 from .dense import factorise, solve
-from .jit import kernel
+from .jit import inlined_kernel, kernel
 from .joint import OPEN, STICK, slip_sign
 
 
-@kernel
+@inlined_kernel
 def tie(points, state, p):
     """Shear of a point over minus its normal force while it slides."""
     return slip_sign(state) * points.mu[p]
 
 
-@kernel
+@inlined_kernel
 def _released(points, inverse, state, work):
     """Rows of the inverse whose degrees of freedom `state` releases, into work.queue, with their ties; their number."""
     count = 0

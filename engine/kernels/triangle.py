@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import kernel
+from .blocks import copy
+from .jit import allocating_kernel, kernel
 
 _NEAR = (8 - sqrt(10) + sqrt(38 - 44 * sqrt(0.4))) / 18
 _FAR = (8 - sqrt(10) - sqrt(38 - 44 * sqrt(0.4))) / 18
@@ -40,7 +41,7 @@ class Solids(NamedTuple):
 def shape(at, N):
     """Fill N (n,), the shape functions at a place."""
     if N.shape[0] == 3:
-        N[:] = at
+        copy(at, N)
         return
     for i in range(3):
         N[i] = at[i] * (2.0 * at[i] - 1.0)
@@ -79,7 +80,7 @@ def gradients(xy, at, dN):
     return determinant
 
 
-@kernel
+@allocating_kernel
 def strain_matrix(xy, at, B):
     """Fill B (3, 2n): (eps_xx, eps_yy, gamma_xy) = B (u1x, u1y, u2x, …); the determinant of the map is returned."""
     dN = np.empty((xy.shape[0], 2))
@@ -101,7 +102,7 @@ def elasticity_matrix(E, nu, D):
     D[2, 2] = factor * (0.5 - nu)
 
 
-@kernel
+@allocating_kernel
 def stiffness(xy, E, nu, thickness, K):
     """Fill K (2n, 2n) = ∫ BᵀDB h dA of one triangle (D1)."""
     B, D, at = np.empty((3, K.shape[0])), np.empty((3, 3)), np.empty(3)
@@ -119,7 +120,7 @@ def stiffness(xy, E, nu, thickness, K):
                     K[i, j] += weight * stress * B[p, j]
 
 
-@kernel
+@allocating_kernel
 def mass(xy, rho, thickness, lumped, m):
     """Fill m (n, n), the mass between nodes for x as for y: consistent, ∫ rho N Nᵀ h dA, or row-sum lumped (D1).
 
@@ -136,7 +137,7 @@ def mass(xy, rho, thickness, lumped, m):
                 m[i, i if lumped else j] += weight * N[i] * N[j]
 
 
-@kernel
+@allocating_kernel
 def stress_matrix(xy, E, nu, at, S):
     """Fill S (4, 2n): (sigma_xx, sigma_yy, sigma_xy, sigma_zz) = S u at a place, tension positive."""
     B, D = np.empty((3, S.shape[1])), np.empty((3, 3))
@@ -148,7 +149,7 @@ def stress_matrix(xy, E, nu, at, S):
         S[3, j] = nu * (S[0, j] + S[1, j])
 
 
-@kernel
+@allocating_kernel
 def all_matrices(solids, lumped, K, m):
     """Element matrices of all triangles: K (n_triangle, 2n, 2n), m (n_triangle, n, n)."""
     for t in range(solids.triangles.shape[0]):
@@ -157,7 +158,7 @@ def all_matrices(solids, lumped, K, m):
         mass(xy, solids.rho[t], solids.thickness, lumped, m[t])
 
 
-@kernel
+@allocating_kernel
 def all_stress_matrices(solids, at, S):
     """Stress matrices S (n_triangle, 4, 2n) at one place `at` (n_triangle, 3) in each triangle."""
     for t in range(solids.triangles.shape[0]):
