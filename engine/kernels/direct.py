@@ -19,8 +19,12 @@ EQUATION_TOLERANCE = 1e-12
 GAP_TOLERANCE = 1e-11
 """Residual over the gaps beyond which a solution is refined; a floating box, say, has free gaps a million times larger."""
 
-PASSES = 5
+PASSES = 20
 """Solves in a row, each for what the one before has left; a new inverse costs as much as fifty."""
+
+STALLED, NEW_STALLED = 0.1, 0.5
+"""Part of the residual left by a solve after which no other is made, with an inverse that was kept and with a new one: none is
+better. That of a floating box knows forces to a tenth, where G is large beside the compliance of the joint itself."""
 
 
 @kernel
@@ -98,9 +102,9 @@ def _free_gaps(g_free, Gl, state, g):
 
 
 @kernel
-def solution(points, kept, state, n_released, g_free, g, lam):
+def solution(points, kept, state, n_released, anew, g_free, g, lam):
     """Solve with what `direct` has made ready for these states, and refine while that is called for and helps; the residual."""
-    found = of_gaps = 0.0
+    found, of_gaps, stalled = 0.0, 0.0, NEW_STALLED if anew else STALLED
     for attempt in range(PASSES):
         before = found
         if attempt == 0:
@@ -113,7 +117,7 @@ def solution(points, kept, state, n_released, g_free, g, lam):
         product(points.G, lam, kept.product)
         _free_gaps(g_free, kept.product, state, g)
         found, of_gaps = residual(g_free, g, kept.product)
-        if not (found > 0.1 * EQUATION_TOLERANCE or of_gaps > GAP_TOLERANCE) or (attempt > 0 and found > 0.1 * before):
+        if not (found > 0.1 * EQUATION_TOLERANCE or of_gaps > GAP_TOLERANCE) or (attempt > 0 and found > stalled * before):
             break
     return found
 
@@ -125,7 +129,7 @@ def direct(points, kept, g_free, state, g, lam):
     for anew in (False, True):
         ready = build(points, inverse, state, work) if anew else hold(points, inverse, state, work)
         n_released = release(points, inverse, state, work) if ready else -1
-        found = np.inf if n_released < 0 else solution(points, kept, state, n_released, g_free, g, lam)
+        found = np.inf if n_released < 0 else solution(points, kept, state, n_released, anew, g_free, g, lam)
         if found <= EQUATION_TOLERANCE:
             break
     return found, n_released

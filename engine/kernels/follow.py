@@ -84,7 +84,7 @@ def follow(points, kept, work, g_free, from_near, state, g, lam):
     moved, came_from, forwards = -1, OPEN, True
     for _ in range(MAX_PIECES * state.shape[0]):
         residual, n_released = direct(points, kept, work.far, state, work.far_gap, work.far_force)
-        if not np.isfinite(residual) or not np.isfinite(solution(points, kept, state, n_released, g_free, g, lam)):
+        if not np.isfinite(residual) or not np.isfinite(solution(points, kept, state, n_released, True, g_free, g, lam)):
             return False
         if moved >= 0:
             before = _margin(points, moved, came_from, state[moved], work.far_gap, work.far_force)
