@@ -19,7 +19,7 @@ from engine import Status
 
 from ..batch import trace_case
 from ..domain_size import convergence_sentences, is_domain_size, source_sentence
-from ..messages import StudyError
+from ..messages import StudyError, one_line
 from ..plan import Study, shipped_studies
 from ..provenance import study_hash
 from ..rerun import rerun as repeat
@@ -85,7 +85,7 @@ def trace(names: list[str], case: int | None, asked: bool) -> None:
     if (case is None and n > 1) or (case is not None and case > n):
         raise refuse([f"--case{'' if case is None else f' {case}'}: must be a number from 1 to {n}, the cases of {study.name}"])
     index = (case or 1) - 1
-    print(f"case {index + 1} of {n}: {study.label(index)}")
+    print(f"case {index + 1} of {n}: {one_line(study.label(index))}")
     print(TRACE_HEAD)
     status, reason = trace_case(study, index, lambda step, model: print(trace_line(step, model)))
     print(f"{status.name.lower().replace('_', ' ')}{f': {reason}' if reason else ''}")
@@ -93,6 +93,8 @@ def trace(names: list[str], case: int | None, asked: bool) -> None:
 
 
 def _check_paths(paths: list[Path], sources: list[str]) -> None:
+    if unwritable := [f"{path}: its name is not text (UTF-8); choose another with --out" for path in paths if not _is_text(path)]:
+        raise refuse(unwritable)
     wrong = [f"{path}: is a folder, must be a file" for path in paths if path.is_dir()]
     wrong += [
         f"{path}: is a device or a pipe, results would replace it"
@@ -117,6 +119,11 @@ def _check_paths(paths: list[Path], sources: list[str]) -> None:
             wrong.append(f"{existing}: cannot be written to; choose another place with --out")
     if wrong:
         raise refuse(wrong)
+
+
+def _is_text(path: Path) -> bool:
+    """Whether a netCDF file can have this name."""
+    return not any("\ud800" <= character <= "\udfff" for character in str(path))
 
 
 def _make(study: Study, path: Path, workers: Workers, fresh: bool) -> float:
@@ -146,7 +153,7 @@ def _bar(name: str) -> Iterator[Watch]:
 
         def begin(run: Run) -> Callable[[int], None]:
             total = run.study.case_steps
-            task = bar.add_task(name, total=total, completed=total - run.steps_left)
+            task = bar.add_task(one_line(name), total=total, completed=total - run.steps_left)
             if run.n_there:
                 bar.console.print(f"{name}: {run.n_there} of {in_batches(len(run.entries))} there already", markup=False)
             return partial(bar.advance, task)
@@ -259,7 +266,7 @@ def _is_finished(study: Study, path: Path) -> bool:
 
 def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
     console.out.print()
-    console.out.print(Text(study.title, style="bold"))
+    console.out.print(Text(one_line(study.title), style="bold"))
     for sentence in [study.scaling.sentence, *sentences(ds)]:
         if sentence:
             console.out.print(sentence, markup=False)
@@ -267,7 +274,7 @@ def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
         for sentence in [*convergence_sentences(ds), source_sentence(ds)]:
             console.out.print(sentence, markup=False)
     for line in lost[:20]:
-        console.out.print(f"failed: {line}", markup=False)
+        console.out.print(f"failed: {one_line(line)}", markup=False)
     if len(lost) > 20:
         console.out.print(f"… and {len(lost) - 20} more; see status and reason in the file")
 
@@ -277,7 +284,7 @@ def _sum_up(rows: list[tuple[str, ...]]) -> None:
         console.out.print(_summary(rows))
         return
     for study, cases, lost, seconds, path in rows:
-        console.out.print(f"\n{study}: {cases} cases, {lost} failures, {seconds}", markup=False)
+        console.out.print(f"\n{one_line(study)}: {cases} cases, {lost} failures, {seconds}", markup=False)
         say(path)
 
 
@@ -286,5 +293,5 @@ def _summary(rows: list[tuple[str, ...]]) -> Table:
     for name, justify in (("study", "left"), ("cases", "right"), ("failures", "right"), ("wall time", "right"), ("file", "left")):
         grid.add_column(name, justify=justify, overflow="fold")  # type: ignore[arg-type]
     for row in rows:
-        grid.add_row(*map(escape, row))
+        grid.add_row(*(escape(one_line(entry)) for entry in row))
     return grid
