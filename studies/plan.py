@@ -146,6 +146,8 @@ def load_study(source: str | Path) -> Study:
 
 def read_table(text: str) -> dict[str, Any]:
     """The table that a study's text holds; ValueError where it is no TOML, or larger than any study."""
+    if len(text) > MOST_BYTES:
+        raise ValueError(f"is larger than {MOST_BYTES // 1_000_000} MB")
     try:
         table = tomllib.loads("" if (dotted := _DOTTED.search(text)) else text)
     except tomllib.TOMLDecodeError as error:

@@ -29,7 +29,7 @@ from ..store import Store
 from ..tables import failures, sentences
 from . import console
 from .console import DONE, INTERRUPTED, SOME_FAILED, load_all, refuse, say
-from .reading import draw, opened_results
+from .reading import draw
 
 NARROW = 60
 """Characters; on terminals narrower than this the summary is lines, not a table that would cut its numbers."""
@@ -197,16 +197,13 @@ def _watched(name: str, path: Path) -> Iterator[Watch]:
 
 def rerun(path: Path, workers: Workers) -> None:
     """Repeat the study of a results file and say whether the results are the same."""
-    with opened_results(path) as ds:
-        name = str(ds.attrs["study_name"])
-
     def stopped() -> str:
         return f"nothing is said of {path}."
 
     def failed(error: OSError) -> str:
         return f"{error.filename or path}: {_why(error)}"
 
-    with _stops_told(stopped, failed), _bar(name) as begin:
+    with _stops_told(stopped, failed), _bar(path.stem) as begin:
         found = repeat(path, workers, begin)
     for line in found.in_words():
         say(line)
