@@ -118,7 +118,7 @@ def _values(name: str, written: Any, field: Field, mistakes: list[str]) -> list[
         values += _range(name, entry, field, mistakes) if isinstance(entry, dict) else _single(name, entry, field, mistakes)
     twice = [value for value, count in Counter(values).items() if count > 1]
     mistakes += [f"{name}: holds {shown(value)} {field.unit} twice".replace("  ", " ") for value in twice[:1]]
-    return values
+    return list(dict.fromkeys(values))
 
 
 def _single(name: str, entry: Any, field: Field, mistakes: list[str]) -> list[Any]:

@@ -149,16 +149,22 @@ def _bar(name: str) -> Iterator[Watch]:
         TaskProgressColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with Progress(*columns, console=console.err) as bar, _stopped_by_sigterm():
+    bar = Progress(*columns, console=console.err)
+    with _stopped_by_sigterm():
 
         def begin(run: Run) -> Callable[[int], None]:
+            bar.start()
             total = run.study.case_steps
             task = bar.add_task(one_line(name), total=total, completed=total - run.steps_left)
             if run.n_there:
                 bar.console.print(f"{name}: {run.n_there} of {in_batches(len(run.entries))} there already", markup=False)
             return partial(bar.advance, task)
 
-        yield begin
+        try:
+            yield begin
+        finally:
+            if bar.tasks:
+                bar.stop()
 
 
 @contextmanager
