@@ -49,10 +49,10 @@ def rows_of(name: str, lines: Sequence[str]) -> list[Row]:
         text = _stripped(line)
         if not text or (text.startswith(COMMENT_SIGNS) and not (rows and _ERROR_OF_A_SPREADSHEET.match(text))):
             continue
-        if rows and len(text) > LONGEST_LINE:
-            raise MotionError(f"{name}: line {number}: is longer than {LONGEST_LINE:,} characters; is it a record?")
         words = _SEPARATOR.split(text[:LONGEST_LINE])
         if rows or not _is_header(text, words[0]):
+            if len(text) > LONGEST_LINE:
+                raise MotionError(f"{name}: line {number}: is longer than {LONGEST_LINE:,} characters; is it a record?")
             rows.append(Row(number, words))
         elif (headers := headers + 1) > MOST_HEADER_LINES:
             break

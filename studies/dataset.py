@@ -7,7 +7,7 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from engine import GroundMotion, MotionError, Status
+from engine import GroundMotion, Status
 from engine.recorder import STRESSES
 
 from .merge import COMPRESSED, Merge, Part
@@ -18,6 +18,8 @@ from .schema import COORDINATES, EXTREMES, MESH, SCHEMA, Variable
 
 MOST_PACKED = 1032
 """Bytes that one byte of a zlib stream may stand for: what a file says to hold beyond that is not in it."""
+
+POINTER_BYTES = 8
 
 RECORDS = "records"
 """Group of a results file that holds the records; xarray and viewers pass over it."""
@@ -58,8 +60,6 @@ def read_records(path: Path) -> dict[str, GroundMotion]:
     """The records that a results file holds, by the names that its study gives them."""
     with netCDF4.Dataset(path) as file:
         found = file.groups[RECORDS].variables.values() if RECORDS in file.groups else ()
-        if sum(v.size * v.dtype.itemsize for v in found) > MOST_PACKED * path.stat().st_size:
-            raise MotionError("more values than the file can hold")
         return {v.record: GroundMotion(Path(v.record).name, float(v.dt), np.array(v[:])) for v in found}
 
 
@@ -68,11 +68,17 @@ def open_results(path: Path) -> xr.Dataset:
     if not path.is_file():
         raise StudyError([f"{path}: there is no such results file; results are written by `coralquake run`"])
     try:
+        with netCDF4.Dataset(path) as file:
+            said, size = _said_to_hold(file), path.stat().st_size
+        if said > MOST_PACKED * size:
+            raise StudyError([f"{path}: says to hold {said:,} bytes, which its {size:,} cannot"])
         ds = xr.open_dataset(path, engine="netcdf4")
+    except StudyError:
+        raise
     except Exception:  # HDF5, netCDF4 and xarray pass on whatever they met
         raise StudyError([f"{path}: is not a netCDF file that can be read"]) from None
     try:
-        wrong = next(_wrong(ds, path.stat().st_size), None)
+        wrong = next(_wrong(ds), None)
     except Exception as error:
         wrong = _damaged(error)
     if wrong:
@@ -90,16 +96,20 @@ def read_results(path: Path) -> xr.Dataset:
             raise StudyError([f"{path}: {_damaged(error)}"]) from None
 
 
+def _said_to_hold(group: netCDF4.Dataset) -> int:
+    """Bytes of all variables of a group and those in it; the words of one that holds text are not counted."""
+    own = sum(int(v.size) * (POINTER_BYTES if v.dtype is str else v.dtype.itemsize) for v in group.variables.values())
+    return own + sum(map(_said_to_hold, group.groups.values()))
+
+
 def _damaged(error: Exception) -> str:
     return f"is damaged: {str(error) or type(error).__name__}"
 
 
-def _wrong(ds: xr.Dataset, size: int) -> Iterator[str]:
+def _wrong(ds: xr.Dataset) -> Iterator[str]:
     """What sets a dataset apart from those that are written here, the first of it first."""
     if "study_hash" not in ds.attrs or "status" not in ds:
         yield "was not written by coralquake"
-    if ds.nbytes > MOST_PACKED * size:
-        yield f"says to hold {ds.nbytes:,} bytes, which its {size:,} cannot"
     yield from (f"has no text {name}" for name in ATTRIBUTES if not isinstance(ds.attrs.get(name), str))
     axes = ds["status"].dims
     for axis in axes:

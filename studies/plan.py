@@ -148,17 +148,20 @@ def read_table(text: str) -> dict[str, Any]:
     """The table that a study's text holds; ValueError where it is no TOML, or larger than any study."""
     if len(text) > MOST_BYTES:
         raise ValueError(f"is larger than {MOST_BYTES // 1_000_000} MB")
+    nested = ValueError("is nested too deeply for a study")
+    if _DOTTED.search(text):
+        raise nested
     try:
-        table = tomllib.loads("" if (dotted := _DOTTED.search(text)) else text)
+        table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"is not valid TOML: {error}{_quotes(text, str(error))}") from None
     except ValueError:  # of int()
         raise ValueError("is not valid TOML: holds a whole number of more than 4300 figures") from None
     except RecursionError:
-        dotted = True
-    depth, count = _extent(table) if not dotted else (0, 0)
-    if dotted or depth > MOST_NESTED:
-        raise ValueError("is nested too deeply for a study")
+        raise nested from None
+    depth, count = _extent(table)
+    if depth > MOST_NESTED:
+        raise nested
     if count > MOST_KEYS:
         raise ValueError(f"holds {count:,} keys and tables; must be at most {MOST_KEYS:,}")
     return table

@@ -53,9 +53,7 @@ def _schema_lines() -> Iterator[str]:
         if (head := ".".join(path)) != table:
             table = head
             yield ""
-            yield (
-                "[[layer]]                      # once for every layer, from the top" if table == "layer.N" else f"[{table}]"
-            )
+            yield ("[[layer]]                      # once for every layer, from the top" if table == "layer.N" else f"[{table}]")
         plain = field.default in ("true", "false", "–") or field.default.lstrip("-")[:1].isdigit()
         value = field.default if plain and not (field.unit and field.default != "–") else f'"{field.default}"'
         if field.default == "–" and field.unit:

@@ -203,6 +203,7 @@ def _watched(name: str, path: Path) -> Iterator[Watch]:
 
 def rerun(path: Path, workers: Workers) -> None:
     """Repeat the study of a results file and say whether the results are the same."""
+
     def stopped() -> str:
         return f"nothing is said of {path}."
 

@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 from studies import StudyError, load_study
 from studies.__main__ import app
 from studies.plan import MOTIONS, shipped_studies
+from tests.studies.malformed import KNET
 
 Generator = np.random.Generator
 
@@ -71,13 +72,84 @@ layer.1.friction = [0.1, 0.2]
 SETTINGS = {"a.AT2": "", "a.EW": "", "a.csv": 'record_unit = "cm/s**2"\n', "a.txt": 'record_unit = "Gal"\nrecord_dt = "0.01 s"\n'}
 
 VALUES = (
-    *("0", "1", "-1", "-0.0", "3.5", "true", "false", "nan", "-inf", "inf", "1e400", "1e-400", "5e-324", "1e308", "0x10", "1_000"),
-    *("1979-05-27", "07:32:00", "1979-05-27T07:32:00Z", "[]", "{}", "[1]", "[[1]]", "{ a = 1 }", "[{}]", "'text'", '""', "''''''"),
-    *('"5 m"', '"5 Pa"', '"5 N/cm**2"', '"5 g"', '"-3 s"', '"1e400 m"', '"nan m"', '"5 m m"', '"5 m**9**9**9"', '"((((5 m"', "[1, 'a']"),
-    *('"\\u202e\\u0000\\n\\r\\u001b[2J"', '"\\ud800"', '"\\U0010FFFF"', '"🦀 Übung"', "'''a\nb'''", '"{x}%s\\\\"', '"[bold]x[/bold]"'),
+    *(
+        "0",
+        "1",
+        "-1",
+        "-0.0",
+        "3.5",
+        "true",
+        "false",
+        "nan",
+        "-inf",
+        "inf",
+        "1e400",
+        "1e-400",
+        "5e-324",
+        "1e308",
+        "0x10",
+        "1_000",
+    ),
+    *(
+        "1979-05-27",
+        "07:32:00",
+        "1979-05-27T07:32:00Z",
+        "[]",
+        "{}",
+        "[1]",
+        "[[1]]",
+        "{ a = 1 }",
+        "[{}]",
+        "'text'",
+        '""',
+        "''''''",
+    ),
+    *(
+        '"5 m"',
+        '"5 Pa"',
+        '"5 N/cm**2"',
+        '"5 g"',
+        '"-3 s"',
+        '"1e400 m"',
+        '"nan m"',
+        '"5 m m"',
+        '"5 m**9**9**9"',
+        '"((((5 m"',
+        "[1, 'a']",
+    ),
+    *(
+        '"\\u202e\\u0000\\n\\r\\u001b[2J"',
+        '"\\ud800"',
+        '"\\U0010FFFF"',
+        '"🦀 Übung"',
+        "'''a\nb'''",
+        '"{x}%s\\\\"',
+        '"[bold]x[/bold]"',
+    ),
     *('"none"', '"synthetic"', '"ricker"', "{ from = 0, to = '1 Pa', num = 1000000000000 }", "{ from = 1, to = 2, num = 2.5 }"),
-    *('"../../x"', '"../../../../../../etc/passwd"', '"/etc/passwd"', '"/dev/zero"', '"/dev/full"', '"/dev/stdin"', '"fifo"', '"."'),
-    *('"~"', '"file:///etc/passwd"', '"http://a/b"', '"C:\\\\x"', '"a\\nb"', '"folder"', '"m.toml"', '"-"', '"*"', '"$(id)"', '"|id"'),
+    *(
+        '"../../x"',
+        '"../../../../../../etc/passwd"',
+        '"/etc/passwd"',
+        '"/dev/zero"',
+        '"/dev/full"',
+        '"/dev/stdin"',
+        '"fifo"',
+        '"."',
+    ),
+    *(
+        '"~"',
+        '"file:///etc/passwd"',
+        '"http://a/b"',
+        '"C:\\\\x"',
+        '"a\\nb"',
+        '"folder"',
+        '"m.toml"',
+        '"-"',
+        '"*"',
+        '"$(id)"',
+        '"|id"',
+    ),
 )
 """Of every type, of every size, and names of places that are no records."""
 
@@ -94,7 +166,19 @@ LARGE: tuple[Callable[[int], str], ...] = (
     lambda n: f'"{chr(92)}u0041{"(" * n}"',
 )
 
-KEYS = ("a", "''", '"a.b"', '"\\n"', '"\\u001b[2J"', "layer.1.E", "layer.99.E", f"layer.{'1' * 5000}.E", "p0", "k" * 5000, "pressure")
+KEYS = (
+    "a",
+    "''",
+    '"a.b"',
+    '"\\n"',
+    '"\\u001b[2J"',
+    "layer.1.E",
+    "layer.99.E",
+    f"layer.{'1' * 5000}.E",
+    "p0",
+    "k" * 5000,
+    "pressure",
+)
 
 
 @dataclass(frozen=True)
@@ -131,15 +215,6 @@ def record(name: str) -> bytes:
     if name == "a.csv":
         return ("t, a\n" + "".join(f"{0.01 * i:.2f},{value}\n" for i, value in enumerate(values))).encode()
     return "\n".join(map(str, values)).encode()
-
-
-KNET = (
-    "Origin Time       2006/01/18 23:25:00\nLat.              37.798\nLong.             142.200\nDepth. (km)       36\n"
-    "Mag.              5.7\nStation Code      MYG002\nStation Lat.      38.7262\nStation Long.     141.5109\n"
-    "Station Height(m) 79\nRecord Time       2006/01/18 23:25:46\nSampling Freq(Hz) 100Hz\nDuration Time(s)  1\n"
-    "Dir.              N-S\nScale Factor      1000(gal)/1000\nMax. Acc. (gal)   50.000\n"
-    "Last Correction   2006/01/18 23:25:31\nMemo.\n" + "".join(f"{50 * (-1) ** i:9d}" for i in range(100)) + "\n"
-)
 
 
 # of any file ----------------------------------------------------------------------------------------------------------------
@@ -191,7 +266,21 @@ def _some_of_it_many_times(rng: Generator, raw: bytes) -> bytes:
 def _number_changed(rng: Generator, raw: bytes) -> bytes:
     words = raw.split(b" ")
     i = rng.integers(len(words))
-    choice = [b"", b"-", b"1e999", b"nan", b"-1", b"0", b"1e-320", b"999999999", b"1,5", b"\t", b"0x1", b"1" * 30000 + b"x", b"\xff"]
+    choice = [
+        b"",
+        b"-",
+        b"1e999",
+        b"nan",
+        b"-1",
+        b"0",
+        b"1e-320",
+        b"999999999",
+        b"1,5",
+        b"\t",
+        b"0x1",
+        b"1" * 30000 + b"x",
+        b"\xff",
+    ]
     words[i] = choice[rng.integers(len(choice))]
     return b" ".join(words)
 
@@ -222,7 +311,13 @@ def _value_of_another_kind(rng: Generator, raw: bytes) -> bytes:
 
 def _value_in_a_list_or_range(rng: Generator, raw: bytes) -> bytes:
     one, two = (VALUES[i] for i in rng.integers(len(VALUES), size=2))
-    layout = ("[{}, {}]", "[{}, {}, {}]", "{{ from = {}, to = {}, num = 3 }}", "{{ from = {}, num = {} }}", "[{{ from = {}, to = {}, num = {} }}]")
+    layout = (
+        "[{}, {}]",
+        "[{}, {}, {}]",
+        "{{ from = {}, to = {}, num = 3 }}",
+        "{{ from = {}, num = {} }}",
+        "[{{ from = {}, to = {}, num = {} }}]",
+    )
     written = layout[rng.integers(len(layout))].format(one, two, two)
     return _with_setting(rng, raw, lambda key, value: f"{key} = {written}")
 
@@ -262,7 +357,16 @@ def _table_of_another_kind(rng: Generator, raw: bytes) -> bytes:
     if heads := [i for i, line in enumerate(lines) if line.startswith("[")]:
         i = heads[rng.integers(len(heads))]
         name = lines[i].partition("#")[0].strip().strip("[]")
-        ways = (f"[[{name}]]", f"[{name}.{name}]", f"[{name}]\n[{name}]", f"{name} = 3", f"{name} = []", f"[{name}", "[sweep]", f"[{'a.' * 30}a]")
+        ways = (
+            f"[[{name}]]",
+            f"[{name}.{name}]",
+            f"[{name}]\n[{name}]",
+            f"{name} = 3",
+            f"{name} = []",
+            f"[{name}",
+            "[sweep]",
+            f"[{'a.' * 30}a]",
+        )
         lines[i] = ways[rng.integers(len(ways))]
     return "\n".join(lines).encode(errors="replace")
 
@@ -312,7 +416,7 @@ def tried(found: Mutant, folder: Path) -> tuple[str, list[str]]:
         return STUDY_IS_VALID, _changed(before, folder)
     except StudyError as error:
         mistakes, seconds = error.mistakes, time.process_time() - start
-    except Exception as error:  # noqa: BLE001
+    except Exception as error:
         return REFUSED, [f"{type(error).__name__}: {error}"[:300]]
     return REFUSED, [*_wrong(mistakes, seconds), *_of_the_command(inner, mistakes), *_changed(before, folder)]
 

@@ -1,4 +1,4 @@
-"""Results and batch files that were damaged or forged: one line and exit code 2, or computed anew; and nothing in them is executed."""
+"""Results and batch files, damaged or forged: one line and exit code 2, or computed anew; nothing in them is executed."""
 
 import json
 import os
@@ -23,6 +23,8 @@ from studies.runner import run_into
 from studies.store import Store, opened, verified, write_batch
 
 from .conftest import QUICK, SHORT, study_of
+
+BRIEF = {"time": {"dt": "0.01 s", "duration": "0.1 s"}, "mesh": {"order": 1, "corner_levels": 0}}
 
 READ = ("show", "table", "plot", "rerun")
 
@@ -148,7 +150,7 @@ def test_no_bit_that_turns_changes_a_number_quietly(original, tmp_path):
     good = _in_a_process(original, path)
     assert good is not None
     found = Counter()
-    for place in rng.integers(len(original), size=24):
+    for place in rng.integers(len(original), size=16):
         raw = bytearray(original)
         raw[place] ^= 1 << rng.integers(8)
         ended = _in_a_process(bytes(raw), path)
@@ -223,7 +225,7 @@ def test_a_record_that_was_changed_is_one_line(change, results):
 def test_a_record_of_terabytes_is_one_line(results):
     with netCDF4.Dataset(results, "a") as file:
         of_terabytes(file["records"])
-    assert "more values than the file can hold" in refused(results, ["rerun"])
+    assert "says to hold 8,000,000" in refused(results)
 
 
 def test_a_study_name_leads_nowhere_and_what_steers_a_terminal_is_escaped(results):
@@ -326,13 +328,18 @@ def test_names_in_an_archive_lead_nowhere(batch):
 
 
 def test_a_forged_batch_is_computed_anew_and_a_forged_journal_passed_over(tmp_path):
-    study, path = make_study({"time": {"dt": "0.01 s", "duration": "0.1 s"}, "mesh": {"order": 1, "corner_levels": 0}}), tmp_path / "x.nc"
+    study, path = (
+        make_study({"time": {"dt": "0.01 s", "duration": "0.1 s"}, "mesh": {"order": 1, "corner_levels": 0}}),
+        tmp_path / "x.nc",
+    )
     run_into(path, study, 1, unwatched)
     folder = Store.beside(path).folder
     (batch,) = folder.glob("*.npz")
     whole = batch.read_bytes()
     repacked(batch, **{"racking.npy": npy(np.array([Trap(tmp_path / "sprung")], dtype=object), allow_pickle=True)})
-    (folder / "journal.jsonl").write_bytes(b'not JSON\n{"event": []}\n' + b"[" * 100_000 + b'\n\xff\x00\n{"batch": {}, "event": "begun"}\n3\n')
+    (folder / "journal.jsonl").write_bytes(
+        b'not JSON\n{"event": []}\n' + b"[" * 100_000 + b'\n\xff\x00\n{"batch": {}, "event": "begun"}\n3\n'
+    )
     (folder / "manifest.json").write_bytes(b"\xff not JSON")
     run_into(path, study, 1, unwatched)
     assert batch.read_bytes()[:4] == whole[:4]
@@ -346,7 +353,10 @@ def test_a_forged_batch_is_computed_anew_and_a_forged_journal_passed_over(tmp_pa
 
 
 def test_results_take_the_place_of_a_link_and_leave_where_it_led(tmp_path):
-    study, path = make_study({"time": {"dt": "0.01 s", "duration": "0.1 s"}, "mesh": {"order": 1, "corner_levels": 0}}), tmp_path / "x.nc"
+    study, path = (
+        make_study({"time": {"dt": "0.01 s", "duration": "0.1 s"}, "mesh": {"order": 1, "corner_levels": 0}}),
+        tmp_path / "x.nc",
+    )
     other = Path(tmp_path / "other.txt")
     other.write_text("mine")
     path.symlink_to(other)
