@@ -37,6 +37,8 @@ def draw(ds: xr.Dataset, path: Path) -> None:
             say(f"figure  {figure}")
     except OSError as error:
         raise refuse([f"{path.parent}: figures cannot be written: {error.strerror or error}"]) from None
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # matplotlib, of values that were forged
+        raise refuse([f"{path}: holds what cannot be drawn: {error}"]) from None
 
 
 def plot(path: Path) -> None:

@@ -137,6 +137,12 @@ def test_a_status_that_there_is_not_is_one_line(results):
     assert "holds a status that there is not" in refused(results)
 
 
+def test_places_that_are_none_are_not_drawn(results):
+    with netCDF4.Dataset(results, "a") as file:
+        file["mesh_node_y"][:] = np.nan
+    assert "holds what cannot be drawn" in refused(results, ["plot"])
+
+
 def test_a_pickle_in_place_of_results_is_one_line_and_stays_one(tmp_path):
     (tmp_path / "x.nc").write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
     assert refused(tmp_path / "x.nc") == "is not a netCDF file that can be read"
