@@ -20,7 +20,7 @@ help: ## list the targets
 	@echo "make study STUDY=p0     run one of them, or a study file"
 	@echo "make test               run the tests"
 	@echo "make verify             run the verification cases alone, with their names"
-	@echo "make fuzz N=10000       attack the engine with random models (SEED=1); what it finds goes to results/fuzz"
+	@echo "make fuzz N=10000       attack the engine with random models, the reading with mutated files (SEED=1); findings in results/fuzz"
 	@echo "make figures            draw the figures of docs/ anew, some minutes"
 	@echo "make versus             OpenSees and coralquake on the same model, one figure: results/versus.png"
 	@echo "make bench              all timings, beside OpenSees where it can be installed; some minutes; results/bench.json"
@@ -68,6 +68,7 @@ verify: .venv/tools
 
 fuzz: .venv/tools
 	$(BIN)/python -m tests.fuzz --number $(N) --seed $(SEED)
+	$(BIN)/python -m tests.fuzz.mutations --number $(N) --seed $(SEED)
 
 figures: .venv/installed
 	$(BIN)/python docs/signs.py

@@ -45,9 +45,9 @@ class GroundMotion:
 
     def cut(self, duration: float) -> "GroundMotion":
         """The first `duration` seconds with a 1 s cosine taper at both ends (a quarter of the length at most)."""
-        n = max(2, min(len(self.acceleration), round(duration / self.dt) + 1))
+        n = max(2, round(min(len(self.acceleration) - 1, duration / self.dt)) + 1)
         values = self.acceleration[:n].copy()
-        m = min(round(TAPER / self.dt), n // 4)
+        m = round(min(TAPER / self.dt, n // 4))
         ramp = 0.5 * (1 - np.cos(np.pi * np.arange(m) / max(m, 1)))
         values[:m] *= ramp
         values[n - m :] *= ramp[::-1]

@@ -18,6 +18,8 @@ G_OF_RECORDS = 9.80665
 
 MOST_BYTES = 20_000_000
 MOST_LINES = 250_000
+MOST_VALUES = 2_000_000
+"""Of a PEER record, which has five or eight on a line."""
 
 LARGEST_PEAK = 50.0
 """[m/s²]. The largest on record is 4.36 g, the vector sum at station IWTH25 on 2008-06-14 (Yamada et al. 2010, Seismological
@@ -26,7 +28,7 @@ Research Letters 81, 597)."""
 SMALLEST_PEAK = 1e-4
 """[m/s²], a hundredth of a gal: another unit, or no shaking to follow."""
 
-LONGEST_STEP = 1.0
+SHORTEST_STEP, LONGEST_STEP = 1e-6, 1.0
 """[s]. Instruments record every 0.001 to 0.02 s; a longer step than this is one in milliseconds, or none."""
 
 _NEW_HEADER = re.compile(r"NPTS\s*=\s*(\d{1,9})\s*,?\s*DT\s*=\s*([0-9.EeDd+-]+)", re.IGNORECASE)
@@ -98,9 +100,11 @@ def _read_at2(name: str, lines: list[str]) -> GroundMotion:
     stated = [match[1] for line in lines[:number] if (match := _UNIT.search(line))]
     if stated and stated[0].upper() != "G":
         raise MotionError(f"{name}: its header says units of {stated[0][:20]}; a PEER record of accelerations is in units of G")
+    if (count := sum(len(line.split()) for line in lines[number:])) != int(header[1]):
+        raise MotionError(f"{name}: holds {count} values, its header says {header[1]}")
+    if count > MOST_VALUES:
+        raise MotionError(f"{name}: holds {count:,} values; must be at most {MOST_VALUES:,}")
     values = numbers_of(name, [Row(i, line.split()) for i, line in enumerate(lines[number:], number + 1)])
-    if len(values) != int(header[1]):
-        raise MotionError(f"{name}: holds {len(values)} values, its header says {header[1]}")
     step = numbers_of(name, [Row(number, [header[2]])])[0]
     with np.errstate(over="ignore"):
         return GroundMotion(name, float(step), values * G_OF_RECORDS)
@@ -120,10 +124,11 @@ def _read_knet(name: str, text: str) -> GroundMotion:
     except ImportError:
         raise MotionError(f"{name}: is a K-NET record, which obspy reads: pip install obspy") from None
     except Exception as error:  # obspy passes on whatever its parser met
-        raise MotionError(f"{name}: is not laid out as K-NET records are: {' '.join(str(error).split())}") from None
+        raise MotionError(f"{name}: is not laid out as K-NET records are: {' '.join(str(error).split())[:200]}") from None
     if abs(len(trace.data) * dt - duration) > 1:
         raise MotionError(f"{name}: holds {len(trace.data) * dt:g} s, its header says {duration:g} s")
-    motion = GroundMotion(name, dt, (trace.data - trace.data.mean()) * trace.stats.calib)
+    with np.errstate(over="ignore", invalid="ignore"):
+        motion = GroundMotion(name, dt, (trace.data - trace.data.mean()) * trace.stats.calib)
     if not abs(100 * motion.peak - maximum) <= 0.01 * maximum:
         raise MotionError(f"{name}: reaches {100 * motion.peak:.4g} gal, its header says {maximum:g} gal")
     return motion
@@ -167,5 +172,5 @@ def _refuse_implausible(motion: GroundMotion) -> None:
         )
     if motion.peak < SMALLEST_PEAK:
         raise MotionError(f"{motion.name}: reaches {motion.peak:.2g} m/s² only; is the unit right?")
-    if motion.dt > LONGEST_STEP:
+    if not SHORTEST_STEP <= motion.dt <= LONGEST_STEP:
         raise MotionError(f"{motion.name}: steps by {motion.dt:g} s; is its time in seconds?")

@@ -13,6 +13,9 @@ from .groundmotion import MotionError
 Floats = NDArray[np.float64]
 
 MOST_HEADER_LINES = 100
+LONGEST_LINE = 1000
+"""Characters of a line of numbers in columns."""
+
 COMMENT_SIGNS = ("#", "%")
 
 LOOSEST_TIME = 0.25
@@ -21,7 +24,7 @@ LOOSEST_TIME = 0.25
 LATEST_TIME = 1e10
 """[s], with room for times that count from 1970."""
 
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[EeDd][+-]?\d+)?", re.ASCII)
 _ERROR_OF_A_SPREADSHEET = re.compile(r"#(N/A|NV|[A-ZÄÖÜ/0]+[!?])", re.IGNORECASE)
 _START_OF_NUMBER = re.compile(r"[+-]?\.?\d", re.ASCII)
 _NO_VALUE = {"na", "n/a", "nan", "null", "none", "inf", "infinity"}
@@ -46,8 +49,10 @@ def rows_of(name: str, lines: Sequence[str]) -> list[Row]:
         text = _stripped(line)
         if not text or (text.startswith(COMMENT_SIGNS) and not (rows and _ERROR_OF_A_SPREADSHEET.match(text))):
             continue
-        words = _SEPARATOR.split(text)
+        words = _SEPARATOR.split(text[:LONGEST_LINE])
         if rows or not _is_header(text, words[0]):
+            if len(text) > LONGEST_LINE:
+                raise MotionError(f"{name}: line {number}: is longer than {LONGEST_LINE:,} characters; is it a record?")
             rows.append(Row(number, words))
         elif (headers := headers + 1) > MOST_HEADER_LINES:
             break

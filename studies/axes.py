@@ -12,7 +12,7 @@ import numpy as np
 from engine.units import in_si
 
 from .fields import Field, catalogue, nearest, of_that_name, resolve
-from .messages import shown, table_rule
+from .messages import cut, shown, table_rule
 
 MOST_CASES = 1_000_000
 
@@ -65,7 +65,7 @@ def swept_axes(sweep: Any, mistakes: list[str]) -> list[Axis]:
     for name, written in _flat(sweep).items():
         field = resolve(name)
         if field is None:
-            mistakes.append(f"sweep.{name}: {_no_field(name)}")
+            mistakes.append(f"sweep.{cut(name)}: {_no_field(name)}")
         elif not field.single:
             mistakes.append(f"sweep.{name}: holds several values and cannot be swept; write a study for each")
         elif field.name in OF_THE_RESULTS:
@@ -118,7 +118,7 @@ def _values(name: str, written: Any, field: Field, mistakes: list[str]) -> list[
         values += _range(name, entry, field, mistakes) if isinstance(entry, dict) else _single(name, entry, field, mistakes)
     twice = [value for value, count in Counter(values).items() if count > 1]
     mistakes += [f"{name}: holds {shown(value)} {field.unit} twice".replace("  ", " ") for value in twice[:1]]
-    return values
+    return list(dict.fromkeys(values))
 
 
 def _single(name: str, entry: Any, field: Field, mistakes: list[str]) -> list[Any]:
@@ -150,7 +150,7 @@ def _range(name: str, entry: dict[str, Any], field: Field, mistakes: list[str]) 
         return []
     before = len(mistakes)
     for key in sorted(entry.keys() - set(_RANGE)):
-        mistakes.append(f"{name}.{key}: is not part of a range; must be from, to, num or spacing")
+        mistakes.append(f"{name}.{cut(key)}: is not part of a range; must be from, to, num or spacing")
     ends = []
     for key in ("from", "to"):
         if key not in entry:

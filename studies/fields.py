@@ -110,7 +110,7 @@ def nearest(name: str, known: list[str]) -> str:
 
 def _without_number(name: str) -> tuple[str, str | None]:
     """layer.2.E and layer_2_E as layer.N.E, and the number."""
-    match = re.fullmatch(r"layer([._])([0-9]+)\1(.+)", name)
+    match = re.fullmatch(r"layer([._])([0-9]{1,50})\1(.+)", name)
     return (f"layer.N.{match[3]}", match[2]) if match else (name, None)
 
 
@@ -144,7 +144,7 @@ def of_that_name(name: str) -> list[str]:
 
 def resolve(name: str) -> Field | None:
     """The field that a key of [sweep] names: dotted (layer.2.E), with underscores (damping_ratio), or its last part if unique."""
-    if match := re.fullmatch(r"layer([._])([0-9]+)\1(\w+)", name):
+    if match := re.fullmatch(r"layer([._])([0-9]{1,50})\1(\w+)", name):
         general = next((field for field in catalogue() if field.name == f"layer.N.{match[3]}"), None)
         return None if general is None else replace(general, name=f"layer.{match[2]}.{match[3]}")
     same_leaf = []

@@ -15,11 +15,17 @@ MOST_ALIKE = 3
 """Of the values of an axis that break the same rule, how many are told one by one."""
 
 
+BACKSLASH = "\\"
+
+MOST_BITS = 10_000
+"""Of a whole number that is written in decimals; of more than 4300 of them Python makes an error."""
+
+
 class StudyError(Exception):
     """The study cannot be run; `mistakes` holds one line for each reason."""
 
     def __init__(self, mistakes: list[str]) -> None:
-        told = _thinned(mistakes)
+        told = _thinned([one_line(mistake) for mistake in mistakes])
         super().__init__("\n".join(told))
         self.mistakes = told
 
@@ -41,15 +47,30 @@ def _thinned(mistakes: list[str]) -> list[str]:
     return told
 
 
+def one_line(text: str) -> str:
+    """The text with what is not printed (line ends, what moves the cursor of a terminal or colours it) written as escapes."""
+    return "".join(map(_printed, text))
+
+
+def _printed(character: str) -> str:
+    return character if character.isprintable() else character.encode("unicode_escape").decode()
+
+
+def cut(text: str) -> str:
+    """The text, or its beginning where it is long."""
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def shown(value: Any) -> str:
     """A value as a study file writes it, cut where it is long."""
-    text = _written(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return cut(_written(value))
 
 
 def _written(value: Any) -> str:
     if isinstance(value, str):
-        return '"' + "".join(c if c.isprintable() and c != "\\" else c.encode("unicode_escape").decode() for c in value) + '"'
+        return f'"{one_line(value.replace(BACKSLASH, 2 * BACKSLASH))}"'
+    if isinstance(value, int) and value.bit_length() > MOST_BITS:
+        return hex(value)
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and math.isfinite(value):
@@ -107,7 +128,7 @@ def explain(error: ValidationError, hint: Callable[[str], str] = _nearest_field)
 
 
 def _name(loc: tuple[Any, ...]) -> str:
-    return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in loc)
+    return ".".join(str(part + 1) if isinstance(part, int) else cut(str(part)) for part in loc)
 
 
 def _lines(e: Any, hint: Callable[[str], str]) -> list[str]:

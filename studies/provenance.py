@@ -20,6 +20,9 @@ PACKAGES = ("numpy", "scipy", "numba", "llvmlite")
 MAKERS = ("arrays.py", "batch.py", "scaling.py", "schema.py", "uplift.py")
 """Sources here that decide the content of a batch file, beside the engine's."""
 
+ATTRIBUTES = ("title", "study_name", "study", "study_hash", "records_sha256", "package_versions", "commit", "platform", "created")
+"""Those of `provenance` that are read again."""
+
 
 @cache
 def computer() -> dict[str, str]:

@@ -1,6 +1,5 @@
 """Repeats a study from its results file alone, and says what has changed."""
 
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,13 +8,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import xarray as xr
 
-from engine import MotionError, Spec
+from engine import Spec
 
 from .axes import Axis
 from .batch import Progress
-from .dataset import read_records
+from .dataset import open_results, read_records
 from .messages import StudyError
-from .plan import Study, make_study
+from .plan import Study, make_study, read_table
 from .provenance import machine, records_sha256
 from .runner import Run, Workers, run_into, run_study
 
@@ -77,7 +76,7 @@ class Repeated:
 
 def rerun(path: Path, workers: Workers, watch: Callable[[Run], Progress]) -> Repeated:
     """Compute the study of a results file anew and compare. StudyError where the file does not hold enough to do so."""
-    with xr.open_dataset(path, engine="netcdf4") as before:
+    with open_results(path) as before:
         study, records = _study_of(before, path)
         exact = before.attrs.get("machine_hash") == machine()
         with TemporaryDirectory(prefix="coralquake-", ignore_cleanup_errors=True) as folder:
@@ -95,12 +94,17 @@ def _study_of(ds: xr.Dataset, path: Path) -> tuple[Study, str]:
         raise StudyError([f"{path}: holds no study text; it was not made from a study file"])
     try:
         known = read_records(path)
-    except (OSError, MotionError) as error:
+    except Exception as error:  # netCDF4 passes on whatever HDF5 met
         raise StudyError([f"{path}: its records cannot be read: {error}"]) from None
-    table = tomllib.loads(ds.attrs["study"])
+    try:
+        table = read_table(ds.attrs["study"])
+    except ValueError as error:
+        raise StudyError([f"{path}: its study text {error}"]) from None
     study = make_study(table, ds.attrs["study_name"], ds.attrs["study"], path.parent, path.name, known)
     if records_sha256(study) != ds.attrs["records_sha256"]:
         raise StudyError([f"{path}: was computed with other records than those that are found by their names now"])
+    if study.shape != ds["status"].shape:
+        raise StudyError([f"{path}: holds {ds['status'].size:,} cases, its study text makes {len(study.cases):,}"])
     if not study.motions:
         return study, "without records"
     return study, "records from the file" if known else "records found by their names, their sha256 is the one in the file"

@@ -10,7 +10,7 @@ from hashlib import sha256
 from itertools import chain, count
 from pathlib import Path
 from typing import Any, Self
-from zipfile import BadZipFile
+from zipfile import ZIP_STORED, BadZipFile
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -91,13 +91,30 @@ def opened(path: Path) -> Iterator[tuple[Header, Mapping[str, np.ndarray]]]:
         try:
             file = np.load(raw, allow_pickle=False)
             header = Header(**json.loads(file["header"].tobytes()))
-        except (ValueError, LookupError, TypeError, EOFError, RuntimeError, BadZipFile) as error:
+            _check(file, header)
+        except Exception as error:  # zipfile, zlib, json and numpy pass on whatever they met
             raise _damaged(path, error) from None
         with file:
             try:
                 yield header, file
             except BadZipFile as error:
                 raise _damaged(path, error) from None
+
+
+def _check(file: Any, header: Header) -> None:
+    """Every array is of the shape and dtype that the header says, none of objects, and none packed; ValueError otherwise."""
+    ended = [type(status) is int and status in list(Status) for status in header.status]
+    if not all(ended) or not all(type(reason) is str for reason in header.reason) or len(header.reason) != len(ended):
+        raise ValueError("does not say how its cases ended")
+    for entry in file.zip.infolist():
+        if entry.compress_type != ZIP_STORED:
+            raise ValueError(f"{entry.filename} is packed")
+    for name, (shape, dtype) in header.shapes.items():
+        with file.zip.open(f"{name}.npy") as raw:
+            np.lib.format.read_magic(raw)
+            found, _, kind = np.lib.format.read_array_header_1_0(raw)
+        if found not in (tuple(shape), (len(ended), *shape)) or kind.str != dtype or kind.hasobject:
+            raise ValueError(f"{name} is not of the shape and kind that its header says")
 
 
 def _damaged(path: Path, error: Exception) -> OSError:
@@ -109,7 +126,7 @@ def verified(path: Path) -> bool:
     try:
         with opened(path) as (header, arrays):
             return header.name == path.stem and arrays.zip.testzip() is None  # type: ignore[attr-defined]
-    except OSError:
+    except Exception:  # as in `opened`
         return False
 
 
@@ -200,7 +217,7 @@ class Store:
         """How often the computation of each batch was begun."""
         self._executed.clear()
         for line in self.journal.read_bytes().splitlines() if self.journal.exists() else ():
-            with suppress(ValueError, KeyError, TypeError):
+            with suppress(ValueError, KeyError, TypeError, RecursionError):
                 entry = json.loads(line)
                 self._executed[entry["batch"]] += entry["event"] == "begun"
 

@@ -8,7 +8,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ..dataset import read_results
 from ..files import whole
+from ..messages import StudyError, one_line
 from ..show import show_lines
 from ..tables import axes_of, table
 from . import console
@@ -18,24 +20,12 @@ WIDEST_COLUMN = 30
 """Characters that a column of results may need; the table is as wide as its content, narrower terminals wrap its lines."""
 
 
-def opened_results(path: Path) -> xr.Dataset:
-    """The dataset of a results file, read as it is needed; what is none is refused."""
-    if not path.is_file():
-        raise refuse([f"{path}: there is no such results file; results are written by `coralquake run`"])
-    try:
-        ds = xr.open_dataset(path, engine="netcdf4")
-    except (OSError, ValueError):
-        raise refuse([f"{path}: is not a netCDF file that can be read"]) from None
-    if "study_hash" not in ds.attrs or "status" not in ds:
-        ds.close()
-        raise refuse([f"{path}: was not written by coralquake"])
-    return ds
-
-
 def _open(path: Path) -> xr.Dataset:
-    """All of it, in memory."""
-    with opened_results(path) as ds:
-        return ds.load()
+    """All of a results file, in memory; what is none is refused."""
+    try:
+        return read_results(path)
+    except StudyError as error:
+        raise refuse(error.mistakes) from None
 
 
 def draw(ds: xr.Dataset, path: Path) -> None:
@@ -47,6 +37,8 @@ def draw(ds: xr.Dataset, path: Path) -> None:
             say(f"figure  {figure}")
     except OSError as error:
         raise refuse([f"{path.parent}: figures cannot be written: {error.strerror or error}"]) from None
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # matplotlib, of values that were forged
+        raise refuse([f"{path}: holds what cannot be drawn: {error}"]) from None
 
 
 def plot(path: Path) -> None:
@@ -74,11 +66,11 @@ def tabulate(path: Path, csv: Path | None) -> None:
     grid = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for name in frame.columns:
         head, factor = (str(name), 1.0) if str(name).startswith(tuple(axes_of(ds))) else _readable(str(name))
-        grid.add_column(escape(head), justify="right")
+        grid.add_column(escape(one_line(head)), justify="right")
         if frame[name].dtype.kind == "f":
             frame[name] = [f"{factor * value:.3g}" for value in frame[name]]
     for row in frame.itertuples(index=False):
-        grid.add_row(*map(str, row))
+        grid.add_row(*(escape(one_line(str(entry))) for entry in row))
     Console(width=max(console.out.width, WIDEST_COLUMN * len(frame.columns)), highlight=False).print(grid)
 
 

@@ -19,7 +19,7 @@ from engine import Status
 
 from ..batch import trace_case
 from ..domain_size import convergence_sentences, is_domain_size, source_sentence
-from ..messages import StudyError
+from ..messages import StudyError, one_line
 from ..plan import Study, shipped_studies
 from ..provenance import study_hash
 from ..rerun import rerun as repeat
@@ -29,7 +29,7 @@ from ..store import Store
 from ..tables import failures, sentences
 from . import console
 from .console import DONE, INTERRUPTED, SOME_FAILED, load_all, refuse, say
-from .reading import draw, opened_results
+from .reading import draw
 
 NARROW = 60
 """Characters; on terminals narrower than this the summary is lines, not a table that would cut its numbers."""
@@ -85,7 +85,7 @@ def trace(names: list[str], case: int | None, asked: bool) -> None:
     if (case is None and n > 1) or (case is not None and case > n):
         raise refuse([f"--case{'' if case is None else f' {case}'}: must be a number from 1 to {n}, the cases of {study.name}"])
     index = (case or 1) - 1
-    print(f"case {index + 1} of {n}: {study.label(index)}")
+    print(f"case {index + 1} of {n}: {one_line(study.label(index))}")
     print(TRACE_HEAD)
     status, reason = trace_case(study, index, lambda step, model: print(trace_line(step, model)))
     print(f"{status.name.lower().replace('_', ' ')}{f': {reason}' if reason else ''}")
@@ -93,6 +93,8 @@ def trace(names: list[str], case: int | None, asked: bool) -> None:
 
 
 def _check_paths(paths: list[Path], sources: list[str]) -> None:
+    if unwritable := [f"{path}: its name is not text (UTF-8); choose another with --out" for path in paths if not _is_text(path)]:
+        raise refuse(unwritable)
     wrong = [f"{path}: is a folder, must be a file" for path in paths if path.is_dir()]
     wrong += [
         f"{path}: is a device or a pipe, results would replace it"
@@ -119,6 +121,11 @@ def _check_paths(paths: list[Path], sources: list[str]) -> None:
         raise refuse(wrong)
 
 
+def _is_text(path: Path) -> bool:
+    """Whether a netCDF file can have this name."""
+    return not any("\ud800" <= character <= "\udfff" for character in str(path))
+
+
 def _make(study: Study, path: Path, workers: Workers, fresh: bool) -> float:
     """The seconds it took to make the results file, zero where it was there already."""
     if not fresh and _is_finished(study, path):
@@ -142,16 +149,22 @@ def _bar(name: str) -> Iterator[Watch]:
         TaskProgressColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with Progress(*columns, console=console.err) as bar, _stopped_by_sigterm():
+    bar = Progress(*columns, console=console.err)
+    with _stopped_by_sigterm():
 
         def begin(run: Run) -> Callable[[int], None]:
+            bar.start()
             total = run.study.case_steps
-            task = bar.add_task(name, total=total, completed=total - run.steps_left)
+            task = bar.add_task(one_line(name), total=total, completed=total - run.steps_left)
             if run.n_there:
                 bar.console.print(f"{name}: {run.n_there} of {in_batches(len(run.entries))} there already", markup=False)
             return partial(bar.advance, task)
 
-        yield begin
+        try:
+            yield begin
+        finally:
+            if bar.tasks:
+                bar.stop()
 
 
 @contextmanager
@@ -190,8 +203,6 @@ def _watched(name: str, path: Path) -> Iterator[Watch]:
 
 def rerun(path: Path, workers: Workers) -> None:
     """Repeat the study of a results file and say whether the results are the same."""
-    with opened_results(path) as ds:
-        name = str(ds.attrs["study_name"])
 
     def stopped() -> str:
         return f"nothing is said of {path}."
@@ -199,7 +210,7 @@ def rerun(path: Path, workers: Workers) -> None:
     def failed(error: OSError) -> str:
         return f"{error.filename or path}: {_why(error)}"
 
-    with _stops_told(stopped, failed), _bar(name) as begin:
+    with _stops_told(stopped, failed), _bar(path.stem) as begin:
         found = repeat(path, workers, begin)
     for line in found.in_words():
         say(line)
@@ -259,7 +270,7 @@ def _is_finished(study: Study, path: Path) -> bool:
 
 def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
     console.out.print()
-    console.out.print(Text(study.title, style="bold"))
+    console.out.print(Text(one_line(study.title), style="bold"))
     for sentence in [study.scaling.sentence, *sentences(ds)]:
         if sentence:
             console.out.print(sentence, markup=False)
@@ -267,7 +278,7 @@ def _tell(study: Study, ds: xr.Dataset, lost: list[str]) -> None:
         for sentence in [*convergence_sentences(ds), source_sentence(ds)]:
             console.out.print(sentence, markup=False)
     for line in lost[:20]:
-        console.out.print(f"failed: {line}", markup=False)
+        console.out.print(f"failed: {one_line(line)}", markup=False)
     if len(lost) > 20:
         console.out.print(f"… and {len(lost) - 20} more; see status and reason in the file")
 
@@ -277,7 +288,7 @@ def _sum_up(rows: list[tuple[str, ...]]) -> None:
         console.out.print(_summary(rows))
         return
     for study, cases, lost, seconds, path in rows:
-        console.out.print(f"\n{study}: {cases} cases, {lost} failures, {seconds}", markup=False)
+        console.out.print(f"\n{one_line(study)}: {cases} cases, {lost} failures, {seconds}", markup=False)
         say(path)
 
 
@@ -286,5 +297,5 @@ def _summary(rows: list[tuple[str, ...]]) -> Table:
     for name, justify in (("study", "left"), ("cases", "right"), ("failures", "right"), ("wall time", "right"), ("file", "left")):
         grid.add_column(name, justify=justify, overflow="fold")  # type: ignore[arg-type]
     for row in rows:
-        grid.add_row(*map(escape, row))
+        grid.add_row(*(escape(one_line(entry)) for entry in row))
     return grid
