@@ -63,7 +63,7 @@ def test_solution_is_that_of_the_full_equations(points, n_changed, seed):
         state[changed] = [rng.choice(STATES[old != STATES]) for old in state[changed]]
 
 
-@pytest.mark.parametrize("off", [1e-9, 1e-3, np.nan])
+@pytest.mark.parametrize("off", [1e-9, 1e-1, np.nan])
 def test_inverse_that_rounding_has_spoilt_is_refined_or_replaced(points, off):
     """A small error is taken out by refinement; a large one shows in the residual and the inverse is built anew."""
     rng, memory = np.random.default_rng(8), kept()
