@@ -12,10 +12,11 @@ from engine import Spec
 
 from .axes import Axis
 from .batch import Progress
-from .dataset import open_results, read_records
+from .dataset import read_records
 from .messages import StudyError
 from .plan import Study, make_study, read_table
 from .provenance import machine, records_sha256
+from .results import open_results
 from .runner import Run, Workers, run_into, run_study
 
 TOLERANCE = 1e-9

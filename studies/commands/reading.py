@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ..dataset import read_results
 from ..files import whole
 from ..messages import StudyError, one_line
+from ..results import read_results
 from ..show import show_lines
 from ..tables import axes_of, table
 from . import console

@@ -174,7 +174,7 @@ def _in_a_process(raw, path):
     if not child:
         said = b"failed"
         try:
-            from studies.dataset import read_results
+            from studies.results import read_results
 
             ds = read_results(path)
             numbers = (ds[name].values.tobytes() for name in sorted(map(str, ds.variables)) if ds[name].dtype.kind in "fi")
