@@ -1,7 +1,7 @@
 """Attack the engine: `python -m tests.fuzz --number N --seed S [--only K]`; `make fuzz N=10000 SEED=1`.
 
-Every finding leaves a study file in results/fuzz that reproduces it with `coralquake run`. Exit code 1 where there is one, or
-where a thousandth of the cases or more did not converge.
+Every finding leaves a study file in results/fuzz that reproduces it with `coralquake run`; so does a model that ends the process
+or takes too long. Exit code 1 where there is one, or where a thousandth of the cases or more did not converge.
 """
 
 import os
@@ -22,12 +22,14 @@ from rich.table import Table
 
 from engine import compile_kernels
 from tests.fuzz.examine import FIGURES, LOST, Depth, Examined, examine, largest, summed
-from tests.fuzz.models import as_toml, draw
+from tests.fuzz.models import Drawn, as_toml, draw
 
 FOLDER = Path("results/fuzz")
 
-REFERENCE_EVERY, RELATIONS_EVERY, REORDERED_EVERY = 20, 40, 40
+REFERENCE_EVERY, RELATIONS_EVERY, REORDERED_EVERY, WORKERS_EVERY = 20, 40, 40, 200
 """Models between two that are asked this, too."""
+
+EVERYTHING = Depth(reference=True, relations=True, reordered=True, workers=True)
 
 MOST_SECONDS = 300
 """Of one model; then the process ends itself and says where it was."""
@@ -38,7 +40,12 @@ MOST_UNCONVERGED = 1e-3
 
 def depth_of(number: int) -> Depth:
     """What model `number` is asked beyond its own results."""
-    return Depth(number % REFERENCE_EVERY == 0, number % RELATIONS_EVERY == 1, number % REORDERED_EVERY == 2)
+    return Depth(
+        reference=number % REFERENCE_EVERY == 0,
+        relations=number % RELATIONS_EVERY == 1,
+        reordered=number % REORDERED_EVERY == 2,
+        workers=number % WORKERS_EVERY == 3,
+    )
 
 
 def main() -> int:
@@ -55,9 +62,12 @@ def main() -> int:
             drawn = draw(arguments.seed, number)
             if only is not None:
                 print(as_toml(drawn.table))
-            examined.append(examine(drawn, depth_of(number) if only is None else Depth(True, True, True)))
+            path = _written(drawn)  # stays where the process is lost
+            examined.append(examine(drawn, depth_of(number) if only is None else EVERYTHING))
             for line in examined[-1].findings:
-                console.print(f"model {number}: {line}; coralquake run {_written(examined[-1])}", markup=False, soft_wrap=True)
+                console.print(f"model {number}: {line}; coralquake run {path}", markup=False, soft_wrap=True)
+            if not examined[-1].findings:
+                path.unlink()
     faulthandler.cancel_dump_traceback_later()
     return _tell(console, examined, perf_counter() - start)
 
@@ -70,11 +80,11 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _written(examined: Examined) -> Path:
-    """The study file of a model with findings."""
+def _written(drawn: Drawn) -> Path:
+    """The study file of a model."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    path = FOLDER / f"{examined.drawn.seed}-{examined.drawn.number}.toml"
-    path.write_text(as_toml(examined.drawn.table))
+    path = FOLDER / f"{drawn.seed}-{drawn.number}.toml"
+    path.write_text(as_toml(drawn.table))
     return path
 
 

@@ -55,6 +55,7 @@ class Depth:
     reference: bool = False
     relations: bool = False
     reordered: bool = False
+    workers: bool = False
 
 
 def examine(drawn: Drawn, depth: Depth) -> Examined:
@@ -90,6 +91,9 @@ def _ask(found: Examined, study: Study, ds: xr.Dataset, depth: Depth) -> None:
     if depth.reordered:
         found.findings += reordered(found.drawn.table, study, ds) + own_rate(study)
         found.told["lanes in another order, record at its own rate"] += 1
+    if depth.workers:
+        found.findings += by_two_workers(found.drawn.table, study)
+        found.told["one worker and two"] += 1
 
 
 def _how(model: Callable[[], Model], spec: Spec, status: Status, found: Examined) -> str:
@@ -146,6 +150,15 @@ def reordered(table: Table, study: Study, ds: xr.Dataset) -> list[str]:
     same = other.isel({axis.name: slice(None, None, -1) for axis in study.axes})
     names = [name for name in ds.data_vars if name != "solved_as" and not _equal(ds[name], same[name])]
     return [f"{name}: changes with the order of the cases" for name in names]
+
+
+def by_two_workers(table: Table, study: Study) -> list[str]:
+    """Variables that change by a bit where two processes compute a batch each; another damping makes the second one."""
+    ratio = study.cases[0].damping.ratio
+    sweep = {**table["sweep"], "damping_ratio": [ratio, 0.5 * ratio + 0.01]}
+    wider = make_study({**table, "sweep": sweep}, study.name)
+    one, two = (run_study(wider, workers=workers) for workers in (1, 2))
+    return [f"{name}: changes with the number of workers" for name in one.data_vars if not _equal(one[name], two[name])]
 
 
 def _equal(one: xr.DataArray, other: xr.DataArray) -> bool:
