@@ -22,7 +22,7 @@ SOFTENED_EVERY = 100
 """Iterations after which the proximal term becomes a hundred times softer: a box that nothing but the last of its friction stops
 goes an even step an iteration until it lies on, the longer the softer the term."""
 
-SOFTEST = 2
+SOFTEST = 3
 """Times that it becomes softer."""
 
 

@@ -1,11 +1,16 @@
 """What fuzzing found in single steps, each with its smallest model; what it found elsewhere is tested beside its cause."""
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from engine import Spec, build_model
 from engine.spec import Damping, Gravity, Joint, MeshOptions, Pressure, Time
 from tests.fuzz.against_reference import Verdict, told_steps
+from tests.fuzz.examine import Depth, examine
+from tests.fuzz.models import Drawn
 
 MESH = MeshOptions(
     order=1, wall_elements=1, roof_elements=2, side_elements=2, corner_levels=0, first=3, largest_width=5, largest_height=5
@@ -26,3 +31,14 @@ def test_a_step_with_dashpots_in_stiff_joints_is_right(thickness):
     motion = np.random.default_rng(0).standard_normal((11, 2))
     steps = told_steps(build_model(spec), [spec], [motion], (1, 2, 5, 10))
     assert [step for step in steps if step.verdict not in (Verdict.AGREES, Verdict.ROUNDING)] == []
+
+
+FOUND = sorted((Path(__file__).parent / "found").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", FOUND, ids=[path.stem for path in FOUND])
+def test_models_that_were_found_wanting_are_so_no_more(path):
+    """Each says what was amiss with it."""
+    seed, number = map(int, path.stem.split("-"))
+    found = examine(Drawn(seed, number, tomllib.loads(path.read_text()), ()), Depth(reference=True))
+    assert found.findings == []
