@@ -22,8 +22,9 @@ SOFTENED_EVERY = 100
 """Iterations after which the proximal term becomes a hundred times softer: a box that nothing but the last of its friction stops
 goes an even step an iteration until it lies on, the longer the softer the term."""
 
-SOFTEST = 3
-"""Times that it becomes softer."""
+SOFTEST, HARDEST = 3, 3
+"""Times that it becomes softer; times that it becomes a hundred times harder where the joints find no solution: they then have less
+far to go."""
 
 
 def equilibrium(system: System, lanes: Lanes, loads: list[Floats], first_frequency: float) -> tuple[State, np.ndarray]:
@@ -52,7 +53,7 @@ class _Proximal:
 
     def __init__(self, system: System, eta: float) -> None:
         self._eta, self._system, self._M = eta, system, rows(system.M)
-        self._steppers: list[Stepper] = []
+        self._steppers: dict[int, Stepper] = {}
         self._next = State.at_rest(system)
         self._inertia: Floats = np.zeros((system.n_dof, LANES))
 
@@ -72,6 +73,12 @@ class _Proximal:
             if iteration % SOFTENED_EVERY == 0:
                 self._stepper(softer).condensed.forget(slice(None))  # or a lane's bits would tell of its companions' iterations
             change, failed = self._iterate(trial, lanes, moving, softer)
+            for harder in range(1, HARDEST + 1):
+                if not (again := moving & failed).any():
+                    break
+                self._stepper(softer - harder).condensed.forget(slice(None))
+                forces, failed = self._iterate(trial, lanes, again, softer - harder)
+                change = np.where(again, forces, change)
             lost |= moving & failed
             moving &= ~(failed | (change <= TOLERANCE * scale))
         state.motion.u[:, active] = trial.motion.u[:, active]
@@ -80,13 +87,13 @@ class _Proximal:
 
     def _softened(self, times: int) -> float:
         """eta after it has become softer so many times."""
-        return self._eta / SOFTENING**times
+        return self._eta * SOFTENING**-times
 
     def _stepper(self, softer: int) -> Stepper:
         """The stepper of a proximal term, made once."""
-        while len(self._steppers) <= softer:
-            step = Newmark(2 / np.sqrt(self._softened(len(self._steppers))))
-            self._steppers.append(Stepper(self._system, step, Rayleigh()))
+        if softer not in self._steppers:
+            step = Newmark(2 / np.sqrt(self._softened(softer)))
+            self._steppers[softer] = Stepper(self._system, step, Rayleigh())
         return self._steppers[softer]
 
     def _iterate(self, trial: State, lanes: Lanes, moving: np.ndarray, softer: int) -> tuple[Floats, np.ndarray]:
@@ -96,9 +103,9 @@ class _Proximal:
             mine[:] = theirs
         failed = np.zeros(LANES, dtype=bool)
         failed[list(self._stepper(softer).attempt(following, lanes, rest, rest))] = True
-        step = following.motion.u - trial.motion.u
-        trial.motion.u[:, moving] = following.motion.u[:, moving]
-        for lane in np.flatnonzero(moving[: lanes.n_lane]).tolist():
+        step, done = following.motion.u - trial.motion.u, moving & ~failed
+        trial.motion.u[:, done] = following.motion.u[:, done]
+        for lane in np.flatnonzero(done[: lanes.n_lane]).tolist():
             take_solution(trial.contact, following.contact, lane)
         product(self._M, step, self._inertia)
         return self._softened(softer) * np.linalg.norm(self._inertia, axis=0), failed
