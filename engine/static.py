@@ -23,8 +23,7 @@ SOFTENED_EVERY = 100
 goes an even step an iteration until it lies on, the longer the softer the term."""
 
 SOFTEST, HARDEST = 3, 3
-"""Times that it becomes softer; times that it becomes a hundred times harder where the joints find no solution: they then have less
-far to go."""
+"""Times that it becomes softer, and a hundred times harder where the joints find no solution: they then have less far to go."""
 
 
 def equilibrium(system: System, lanes: Lanes, loads: list[Floats], first_frequency: float) -> tuple[State, np.ndarray]:
