@@ -71,86 +71,20 @@ layer.1.friction = [0.1, 0.2]
 
 SETTINGS = {"a.AT2": "", "a.EW": "", "a.csv": 'record_unit = "cm/s**2"\n', "a.txt": 'record_unit = "Gal"\nrecord_dt = "0.01 s"\n'}
 
-VALUES = (
-    *(
-        "0",
-        "1",
-        "-1",
-        "-0.0",
-        "3.5",
-        "true",
-        "false",
-        "nan",
-        "-inf",
-        "inf",
-        "1e400",
-        "1e-400",
-        "5e-324",
-        "1e308",
-        "0x10",
-        "1_000",
-    ),
-    *(
-        "1979-05-27",
-        "07:32:00",
-        "1979-05-27T07:32:00Z",
-        "[]",
-        "{}",
-        "[1]",
-        "[[1]]",
-        "{ a = 1 }",
-        "[{}]",
-        "'text'",
-        '""',
-        "''''''",
-    ),
-    *(
-        '"5 m"',
-        '"5 Pa"',
-        '"5 N/cm**2"',
-        '"5 g"',
-        '"-3 s"',
-        '"1e400 m"',
-        '"nan m"',
-        '"5 m m"',
-        '"5 m**9**9**9"',
-        '"((((5 m"',
-        "[1, 'a']",
-    ),
-    *(
-        '"\\u202e\\u0000\\n\\r\\u001b[2J"',
-        '"\\ud800"',
-        '"\\U0010FFFF"',
-        '"🦀 Übung"',
-        "'''a\nb'''",
-        '"{x}%s\\\\"',
-        '"[bold]x[/bold]"',
-    ),
-    *('"none"', '"synthetic"', '"ricker"', "{ from = 0, to = '1 Pa', num = 1000000000000 }", "{ from = 1, to = 2, num = 2.5 }"),
-    *(
-        '"../../x"',
-        '"../../../../../../etc/passwd"',
-        '"/etc/passwd"',
-        '"/dev/zero"',
-        '"/dev/full"',
-        '"/dev/stdin"',
-        '"fifo"',
-        '"."',
-    ),
-    *(
-        '"~"',
-        '"file:///etc/passwd"',
-        '"http://a/b"',
-        '"C:\\\\x"',
-        '"a\\nb"',
-        '"folder"',
-        '"m.toml"',
-        '"-"',
-        '"*"',
-        '"$(id)"',
-        '"|id"',
-    ),
-)
+VALUES = [
+    *r"""
+0  1  -1  -0.0  3.5  true  false  nan  -inf  inf  1e400  1e-400  5e-324  1e308  0x10  1_000
+1979-05-27  07:32:00  1979-05-27T07:32:00Z  []  {}  [1]  [[1]]  { a = 1 }  [{}]  'text'  ""  ''''''
+"5 m"  "5 Pa"  "5 N/cm**2"  "5 g"  "-3 s"  "1e400 m"  "nan m"  "5 m m"  "5 m**9**9**9"  "((((5 m"  [1, 'a']
+"\u202e\u0000\n\r\u001b[2J"  "\ud800"  "\U0010FFFF"  "🦀 Übung"  "{x}%s\\"  "[bold]x[/bold]"  "none"  "synthetic"  "ricker"
+{ from = 0, to = '1 Pa', num = 1000000000000 }  { from = 1, to = 2, num = 2.5 }
+"../../x"  "../../../../../../etc/passwd"  "/etc/passwd"  "/dev/zero"  "/dev/full"  "/dev/stdin"  "fifo"  "."  "~"
+"file:///etc/passwd"  "http://a/b"  "C:\\x"  "a\nb"  "folder"  "m.toml"  "-"  "*"  "$(id)"  "|id"
+""".strip()
+    .replace("\n", "  ")
+    .split("  "),
+    "'''a\nb'''",
+]
 """Of every type, of every size, and names of places that are no records."""
 
 LARGE: tuple[Callable[[int], str], ...] = (
@@ -166,19 +100,8 @@ LARGE: tuple[Callable[[int], str], ...] = (
     lambda n: f'"{chr(92)}u0041{"(" * n}"',
 )
 
-KEYS = (
-    "a",
-    "''",
-    '"a.b"',
-    '"\\n"',
-    '"\\u001b[2J"',
-    "layer.1.E",
-    "layer.99.E",
-    f"layer.{'1' * 5000}.E",
-    "p0",
-    "k" * 5000,
-    "pressure",
-)
+LONG = "1" * 5000
+KEYS = ["a", "''", '"a.b"', r'"\n"', r'"\u001b[2J"', "layer.1.E", "layer.99.E", f"layer.{LONG}.E", "p0", "pressure", LONG]
 
 
 @dataclass(frozen=True)
