@@ -14,9 +14,9 @@ LANES = 16
 """Cases that march together. Every lane array is (rows, LANES) with the lane contiguous; short batches are padded."""
 
 FLAGS: dict[str, Any] = {"nogil": True, "_nrt": False, "error_model": "numpy", "fastmath": {"contract"}}
-"""Without numba's runtime (`_nrt`) a kernel can neither make an array nor write one over another (`blocks.copy` does), and nobody
-counts who uses which: half of the time of a small joint solve. `contract` lets a product and a sum become one fused operation,
-the same one in every lane; nothing is reassociated and NaN and infinity keep their meaning."""
+"""Without numba's runtime (`_nrt`) nobody counts who uses which array, half of the time of a small joint solve; so a kernel makes
+none, which would never be freed, and writes one over another by `blocks.copy`. `contract` lets a product and a sum become one
+fused operation, the same one in every lane; nothing is reassociated and NaN and infinity keep their meaning."""
 
 SUMMING = {"contract", "reassoc"}
 """For kernels of one lane whose long sums would wait for every addition: partial sums run side by side, in an order that the
@@ -76,7 +76,7 @@ def inlined_kernel(function: Callable) -> Callable:
 
 
 def allocating_kernel(function: Callable) -> Callable:
-    """A `kernel` that may make arrays of its own."""
+    """A `kernel` that may make arrays of its own, which are freed when it ends."""
     return _compiled(function, FLAGS | {"_nrt": True})
 
 

@@ -1,5 +1,6 @@
 """The numba policy: where machine code is kept, what it depends on, and that the kernels are right without it."""
 
+import ast
 import os
 import shutil
 import subprocess
@@ -148,6 +149,22 @@ def test_key_changes_with_what_summing_kernels_may_do(monkeypatch):
     before = jit._key()
     monkeypatch.setattr(jit, "SUMMING", {"contract"})
     assert jit._key() != before
+
+
+MAKES = {"zeros", "empty", "ones", "full", "array", "copy", "concatenate", "arange", "zeros_like", "empty_like", "append"}
+
+
+def test_only_allocating_kernels_make_arrays():
+    """Others would never free them: numba compiles them all the same once an allocating one has made an array in that way."""
+    found = []
+    for source in Path(jit.__file__).parent.glob("*.py"):
+        for function in ast.walk(ast.parse(source.read_text())):
+            marks = {getattr(mark, "id", "") for mark in getattr(function, "decorator_list", ())}
+            if marks & {"kernel", "summing_kernel", "inlined_kernel"}:
+                calls = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
+                made = {call.attr for call in calls if isinstance(call, ast.Attribute)} & MAKES
+                found += [f"{source.stem}.{function.name}: {name}" for name in made]
+    assert found == []
 
 
 def total(x):
