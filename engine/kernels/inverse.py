@@ -114,7 +114,7 @@ def _add(points, inverse, coming, work):
     return True
 
 
-@kernel
+@inlined_kernel
 def _remove(inverse, going, work):
     """Take points (PAIR,) or fewer out of the set; False where rounding makes that singular."""
     n, H, count = 2 * inverse.size[0], inverse.matrix, 2 * going.shape[0]
@@ -151,7 +151,7 @@ def _close_up(inverse, p):
     inverse.size[0] = last
 
 
-@kernel
+@inlined_kernel
 def hold(points, inverse, state, work):
     """Take all points that are closed in `state` into the set; False where the inverse must be built anew."""
     count = 0
@@ -167,7 +167,7 @@ def hold(points, inverse, state, work):
     return good
 
 
-@kernel
+@inlined_kernel
 def let_go(inverse, state, work):
     """After a solution with `state`: points that have been open for LINGER solutions leave the set."""
     count = 0
@@ -191,7 +191,7 @@ def forget(inverse):
         inverse.place[p] = -1
 
 
-@kernel
+@inlined_kernel
 def build(points, inverse, state, work):
     """Hold just the points closed in `state`, with an inverse from their equations; False where rounding makes them singular."""
     forget(inverse)

@@ -140,7 +140,7 @@ def commit_step(of, drive, ground, ground_end, motion, contact, energy):
     of.clock[COMMIT] += ticks() - began
 
 
-@inlined_kernel
+@kernel
 def watch(step, drive, watches, motion, contact, energy):
     """Read step number `step` and keep it where it is its turn."""
     time, row, n = step * watches.dt, step // watches.every, drive.n_lane

@@ -7,7 +7,7 @@ sliding one just the shear that friction allows, lambda_s + tie lambda_n = 0. Th
 
 from .blocks import subtract_rows
 from .dense import factorise, solve
-from .jit import inlined_kernel, kernel
+from .jit import inlined_kernel
 from .joint import OPEN, STICK, slip_sign
 
 
@@ -35,7 +35,7 @@ def _released(points, inverse, state, work):
     return count
 
 
-@kernel
+@inlined_kernel
 def release(points, inverse, state, work):
     """Factors of the system of the released gaps; their number, -1 where it is singular."""
     H, count = inverse.matrix, _released(points, inverse, state, work)
@@ -49,7 +49,7 @@ def release(points, inverse, state, work):
     return count if factorise(work.equations, count, work.pivot) else -1
 
 
-@kernel
+@inlined_kernel
 def released_forces(inverse, count, work, force):
     """Turn the forces of the bonded set (2 size,), in place, into those with `count` degrees of freedom released."""
     for q in range(count):
