@@ -3,7 +3,6 @@
 import os
 import re
 import signal
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -22,7 +21,7 @@ from studies.runner import run_into
 
 from .conftest import SHORT, study_of
 from .deeds import doubled, worked
-from .test_nothing_lost import LONG, TWO, assert_is, assert_says_how_to_go_on, manifest, poisoned
+from .test_nothing_lost import LONG, TWO, assert_is, assert_says_how_to_go_on, interruptible, manifest, poisoned
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
 
@@ -107,7 +106,7 @@ def test_a_case_that_kills_its_worker_fails_alone(monkeypatch, scheduler, tmp_pa
 def test_a_stopped_run_keeps_what_is_done_and_says_how_to_go_on(scheduler, tmp_path):
     (tmp_path / "long.toml").write_text(LONG.replace("15 s", "60 s"))
     command = [sys.executable, "-m", "studies", "run", "long.toml", "--scheduler", scheduler]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    process = interruptible(command, cwd=tmp_path)
     journal = tmp_path / "results" / "long.batches" / "journal.jsonl"
     while process.poll() is None and not (journal.exists() and "ended" in journal.read_text()):
         time.sleep(0.01)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -212,7 +213,7 @@ def test_a_stopped_run_keeps_what_is_done_and_says_how_to_go_on(sign, folder):
     """Both workers are in the middle of a march; none of them is there afterwards, and nothing is said but that."""
     (folder / "long.toml").write_text(LONG)
     command = [sys.executable, "-m", "studies", "run", "long.toml", "--workers", "2"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = interruptible(command, start_new_session=True)
     journal = folder / "results" / "long.batches" / "journal.jsonl"
     while process.poll() is None and not (journal.exists() and journal.read_text().count("begun") >= 3):
         time.sleep(0.01)
@@ -221,6 +222,13 @@ def test_a_stopped_run_keeps_what_is_done_and_says_how_to_go_on(sign, folder):
     assert not list(folder.rglob("*.part"))
     while is_there(process.pid):  # multiprocessing's own watchman takes a moment
         time.sleep(0.01)
+
+
+def interruptible(command, **settings):
+    """A process that heeds Ctrl-C, also where these tests run in the background of a shell, which has its commands ignore it."""
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, preexec_fn=heed, **pipes, **settings)
 
 
 def assert_says_how_to_go_on(process, folder):
