@@ -14,10 +14,11 @@ from .axes import Axis
 from .batch import Progress
 from .dataset import read_records
 from .messages import StudyError
-from .plan import Study, make_study, read_table
+from .plan import Study, make_study
 from .provenance import machine, records_sha256
 from .results import open_results
 from .runner import Run, Workers, run_into, run_study
+from .text import read_table
 
 TOLERANCE = 1e-9
 """Of a case's largest value of a variable, where another machine or other versions compute: rounding grows to some 1e-12."""
