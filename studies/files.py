@@ -45,3 +45,8 @@ def clear_parts(folder: Path, name: str = "*") -> None:
     for part in folder.glob(f"{name}.*{PART}"):
         with suppress(OSError):  # another program reads it; it does no harm
             part.unlink(missing_ok=True)
+
+
+def is_text(name: str) -> bool:
+    """Whether a file's name is UTF-8, as a message and a netCDF file need it."""
+    return not any("\ud800" <= character <= "\udfff" for character in name)

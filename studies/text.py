@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from .files import is_text
 from .messages import StudyError
 
 MOST_BYTES = 1_000_000
@@ -19,7 +20,8 @@ _DOTTED = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{MOST_NESTE
 def read_text(path: Path) -> str:
     """What stands in a study file; StudyError where that cannot be read or is no text."""
     try:
-        path.name.encode()
+        if not is_text(path.name):
+            raise StudyError([f"{path.name}: its name is not text (UTF-8); rename it"])
         if not path.is_dir() and not path.is_file():
             raise StudyError([f"{path.name}: is a device or a pipe; name a study file"])
         if path.stat().st_size > MOST_BYTES:
@@ -27,8 +29,6 @@ def read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except IsADirectoryError:
         raise StudyError([f"{path.name}: is a folder; name the study file in it"]) from None
-    except UnicodeEncodeError:
-        raise StudyError([f"{path.name}: its name is not text (UTF-8); rename it"]) from None
     except UnicodeDecodeError as error:
         raise StudyError([f"{path.name}: is not UTF-8 text (byte {error.start}); save it as UTF-8"]) from None
     except OSError as error:

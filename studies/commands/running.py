@@ -19,6 +19,7 @@ from engine import Status
 
 from ..batch import trace_case
 from ..domain_size import convergence_sentences, is_domain_size, source_sentence
+from ..files import is_text
 from ..messages import StudyError, one_line
 from ..plan import Study, shipped_studies
 from ..provenance import study_hash
@@ -93,7 +94,9 @@ def trace(names: list[str], case: int | None, asked: bool) -> None:
 
 
 def _check_paths(paths: list[Path], sources: list[str]) -> None:
-    if unwritable := [f"{path}: its name is not text (UTF-8); choose another with --out" for path in paths if not _is_text(path)]:
+    if unwritable := [
+        f"{path}: its name is not text (UTF-8); choose another with --out" for path in paths if not is_text(str(path))
+    ]:
         raise refuse(unwritable)
     wrong = [f"{path}: is a folder, must be a file" for path in paths if path.is_dir()]
     wrong += [
@@ -119,11 +122,6 @@ def _check_paths(paths: list[Path], sources: list[str]) -> None:
             wrong.append(f"{existing}: cannot be written to; choose another place with --out")
     if wrong:
         raise refuse(wrong)
-
-
-def _is_text(path: Path) -> bool:
-    """Whether a netCDF file can have this name."""
-    return not any("\ud800" <= character <= "\udfff" for character in str(path))
 
 
 def _make(study: Study, path: Path, workers: Workers, fresh: bool) -> float:
