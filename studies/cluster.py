@@ -78,7 +78,7 @@ class Cluster:
         self._address, self._function, self._patience = address, function, patience
         self._topic = f"coralquake-{uuid4().hex}"
         self._members: dict[str, _Member] = {}
-        self._finished: deque[tuple[str, Any, Future]] = deque()
+        self._finished: deque[tuple[Any, Any]] = deque()
         self._said: SimpleQueue[tuple[str, int]] = SimpleQueue()
         self._next_look, self._waiting = 0.0, False
 
@@ -90,7 +90,6 @@ class Cluster:
 
     def __exit__(self, *_: object) -> None:
         asked = [member.asked for member in self._members.values() if member.asked is not None]
-        asked += [future for _, _, future in self._finished]
         with _quiet(), suppress(OSError):  # where the scheduler has gone, that has been said
             if self._client.status == "running":
                 self._client.cancel(asked)
@@ -103,7 +102,7 @@ class Cluster:
 
     @property
     def busy(self) -> bool:
-        """Whether a worker computes, or has what is not fetched yet."""
+        """Whether a worker computes, or an answer waits to be taken."""
         return bool(self._finished) or any(member.ready and member.asked is not None for member in self._members.values())
 
     def give(self, ticket: Any, task: Any) -> None:
@@ -115,7 +114,7 @@ class Cluster:
     def answers(self, tell: Callable[[Any, int], None]) -> Iterator[tuple[Any, Any]]:
         """Tickets with answers or `Broken`, as they come within a second; `tell` hears of progress.
 
-        A worker that is done is free before its answer is fetched: it need not wait for its next task until that is written.
+        A worker whose answer is fetched is free: it need not wait for its next task until that answer is taken and written.
         ClusterError where no worker can compute; OSError where the scheduler has gone.
         """
         began = time.monotonic()
@@ -123,8 +122,7 @@ class Cluster:
             yield from self._heard(*self._said.get(timeout=0 if self._finished else TICK), tell)
         except Empty:
             if self._finished:
-                address, ticket, future = self._finished.popleft()
-                yield ticket, self._fetched(address, future)
+                yield self._finished.popleft()
         elapsed = min(time.monotonic() - began, 2 * TICK)
         for address, member in self._members.items():
             member.silent += elapsed
@@ -156,13 +154,15 @@ class Cluster:
                 member.begun = True
 
     def _done(self, address: str, member: _Member) -> None:
+        """Fetch what a worker has before it gets the next task: one that is lost then loses no answer."""
         assert member.asked is not None
-        future = member.asked
+        answer = self._fetched(address, member.asked)
         if member.ready:
-            self._finished.append((address, self._released(member), future))
+            self._finished.append((self._released(member), answer))
+            member.ready = answer != Broken(LEFT)  # otherwise it is asked anew who it is, where it is still there
         else:
             member.asked = None
-            self._judge(address, member, self._fetched(address, future))
+            self._judge(address, member, answer)
 
     def _begun(self, work: Any) -> Any:
         """The future of a coroutine, in the client's own thread."""

@@ -234,10 +234,11 @@ def test_steps_between_two_reports_change_no_bit(stepper, response, monkeypatch,
 
 @pytest.mark.skipif(not clock._HAS_COUNTER, reason="no counter that user programs may read")
 def test_clock_tells_where_the_time_went(stepper, system):
-    """Ticks of every phase of this march alone; a longer march takes more of each."""
-    short, long = (march(Stepper(system, Newmark(DT), Rayleigh()), [shaking(n)]).clock for n in (5, 500))
-    assert short.shape == (len(PHASES),)
-    assert short.dtype == np.int64
+    """Ticks of every phase of this march alone; a longer march takes more of each, the least of what others disturb."""
+    clocks = np.array([[march(Stepper(system, Newmark(DT), Rayleigh()), [shaking(n)]).clock for n in (5, 500)] for _ in range(5)])
+    assert clocks.shape == (5, 2, len(PHASES))
+    assert clocks.dtype == np.int64
+    short, long = clocks.min(axis=0)
     assert (short > 0).all()
     assert (long > short).all()
 
