@@ -1,5 +1,8 @@
 """Compile every kernel that a batch calls, once, before processes start that would each compile them."""
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 
 import numpy as np
@@ -22,7 +25,20 @@ def compile_kernels() -> None:
     With a full cache this takes a fraction of a second. It asks numba instead of a mark that compilation is complete, since
     numba drops its machine code whenever the processor, the Python or a source file's place or time is another.
     """
-    model = build_model(COARSE)
-    motion = np.ones((N_STEP + 1, 2))
-    simulate_cases(model, [COARSE], [motion])
-    free_field(model, [motion])
+    with _uncollected():
+        model = build_model(COARSE)
+        motion = np.ones((N_STEP + 1, 2))
+        simulate_cases(model, [COARSE], [motion])
+        free_field(model, [motion])
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Python looks for no unreachable cycles inside: among the millions of objects of numba's compiler that takes an eighth."""
+    collected = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collected:
+            gc.enable()

@@ -70,7 +70,7 @@ def _begin_afar(points, work, g_free, state):
         work.far[2 * p + 1] = g_free[2 * p + 1]
 
 
-@kernel
+@inlined_kernel
 def follow(points, kept, work, g_free, from_near, state, g, lam):
     """Follow the solution from the gaps of the last step, in work.start, or from afar, to g_free, a border of states at a time.
 
