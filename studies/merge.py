@@ -123,9 +123,9 @@ class Merge:
         self._times: dict[int, np.ndarray] = {}
         for p, part in enumerate(self._parts):
             if part.is_there:
-                with opened(part.path) as (header, arrays):
+                with opened(part.path) as arrays:
                     self._times[p] = arrays["time"]
-                    for name, (shape, dtype) in header.shapes.items():
+                    for name, (shape, dtype) in arrays.header.shapes.items():
                         shapes.setdefault(name, []).append(shape)
                         dtypes.setdefault(name, set()).add(dtype)
         self.grid = _common_time(list(self._times.values()))
@@ -136,7 +136,7 @@ class Merge:
         numbers: dict[str, dict[bytes, int]] = {name: {} for name in shared}
         for p in self._times:
             cases = list(self._parts[p].cases)
-            with opened(self._parts[p].path) as (_, arrays):
+            with opened(self._parts[p].path) as arrays:
                 for name in shared:
                     kinds = self._kinds.setdefault(name, np.full(len(self._study.cases), -1))
                     found = self._told_apart(name, arrays[name], p)
@@ -231,7 +231,7 @@ class Merge:
         used = {of for of in donors if any(v.of == of for v in self.by_case.values())}
         parts = {int(p) for of in used for p in self._part[donors[of][donors[of] >= 0]]}
         for p in sorted(parts):
-            with opened(self._parts[p].path) as (_, arrays):
+            with opened(self._parts[p].path) as arrays:
                 here = {of: np.flatnonzero((donors[of] >= 0) & (self._part[donors[of]] == p)) for of in used}
                 for name, v in self.by_case.items():
                     if (places := here[v.of]).size:
@@ -303,14 +303,14 @@ class Merge:
         """The array that all cases share."""
         case = next(int(case) for case in self._donor[variable.of] if case >= 0)
         p = int(self._part[case])
-        with opened(self._parts[p].path) as (_, arrays):
+        with opened(self._parts[p].path) as arrays:
             values = arrays[name] if variable.of == "mesh" else self._of_cases(name, arrays[name][[self._lane[case]]], p)[0]
             return variable.typed(values)
 
     def _labels(self) -> dict[str, tuple]:
         """Coordinates that number or name what lies along a dimension."""
         case = next(int(case) for case in self._donor["mesh"] if case >= 0)
-        with opened(self._parts[self._part[case]].path) as (_, arrays):
+        with opened(self._parts[self._part[case]].path) as arrays:
             names = {name: (name, arrays[name]) for name in ("point", "section")}
         return names | {
             "time": ("time", self.grid, described("s", COORDINATES["time"].long_name)),

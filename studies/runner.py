@@ -138,8 +138,9 @@ class Run:
         """Sort a batch in; one of which parts are there is these parts."""
         name = self._names.of(batch)
         if self.store.holds(name):
-            with opened(self.store.path(name)) as (header, _):
-                self._entries[name] = Entry(name, batch.all_cases, tuple(header.status), tuple(header.reason))
+            with opened(self.store.path(name)) as arrays:
+                header = arrays.header
+            self._entries[name] = Entry(name, batch.all_cases, tuple(header.status), tuple(header.reason))
         elif self._is_in_parts(batch, on_disk):
             for half in self.study.halves(batch):
                 self._find(half, on_disk)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from itertools import chain, count
 from pathlib import Path
-from typing import Any, Self
-from zipfile import ZIP_STORED, BadZipFile
+from typing import IO, Any, Literal, Self
+from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -84,49 +84,62 @@ def write_batch(path: Path, status: Sequence[int], reason: Sequence[str], cases:
         np.savez(file, allow_pickle=False, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **cases, **model)
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[tuple[Header, Mapping[str, np.ndarray]]]:
-    """Header of a batch file and its arrays, each read and checked when it is asked for; OSError where the file is damaged."""
-    with path.open("rb") as raw:
-        try:
-            file = np.load(raw, allow_pickle=False)
-            header = Header(**json.loads(file["header"].tobytes()))
-            _check(file, header)
-        except Exception as error:  # zipfile, zlib, json and numpy pass on whatever they met
-            raise _damaged(path, error) from None
-        with file:
-            try:
-                yield header, file
-            except BadZipFile as error:
-                raise _damaged(path, error) from None
+class Arrays:
+    """The arrays of a batch file: by name, each read when it is asked for. ValueError where one is not what the header says."""
 
+    def __init__(self, packed: ZipFile) -> None:
+        for entry in packed.infolist():
+            if entry.compress_type != ZIP_STORED:
+                raise ValueError(f"{entry.filename} is packed")
+        self._zip = packed
+        with packed.open("header.npy") as raw:
+            self.header = Header(**json.loads(np.lib.format.read_array(raw, allow_pickle=False).tobytes()))
+        status, reason = self.header.status, self.header.reason
+        ended = all(type(s) is int and s in list(Status) for s in status) and all(type(r) is str for r in reason)
+        if not ended or len(status) != len(reason):
+            raise ValueError("does not say how its cases ended")
 
-def _check(file: Any, header: Header) -> None:
-    """Every array is of the shape and dtype that the header says, none of objects, and none packed; ValueError otherwise."""
-    ended = [type(status) is int and status in list(Status) for status in header.status]
-    if not all(ended) or not all(type(reason) is str for reason in header.reason) or len(header.reason) != len(ended):
-        raise ValueError("does not say how its cases ended")
-    for entry in file.zip.infolist():
-        if entry.compress_type != ZIP_STORED:
-            raise ValueError(f"{entry.filename} is packed")
-    for name, (shape, dtype) in header.shapes.items():
-        with file.zip.open(f"{name}.npy") as raw:
-            np.lib.format.read_magic(raw)
-            found, _, kind = np.lib.format.read_array_header_1_0(raw)
-        if found not in (tuple(shape), (len(ended), *shape)) or kind.str != dtype or kind.hasobject:
+    def __getitem__(self, name: str) -> np.ndarray:
+        with self._zip.open(f"{name}.npy") as raw:
+            shape, order, kind = self._described(name, raw)
+            return np.frombuffer(bytearray(raw.read()), kind).reshape(shape, order=order)
+
+    def _described(self, name: str, raw: IO[bytes]) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype]:
+        """Shape, order and dtype of an array: those that its header says, and not of objects; `raw` is at the values then."""
+        shape, dtype = self.header.shapes[name]
+        np.lib.format.read_magic(raw)
+        found, columns_first, kind = np.lib.format.read_array_header_1_0(raw)
+        if found not in (tuple(shape), (len(self.header.status), *shape)) or kind.str != dtype or kind.hasobject:
             raise ValueError(f"{name} is not of the shape and kind that its header says")
+        return found, "F" if columns_first else "C", kind
+
+    @property
+    def are_whole(self) -> bool:
+        """Whether all are there and their checksums hold."""
+        for name in self.header.shapes:
+            with self._zip.open(f"{name}.npy") as raw:
+                self._described(name, raw)
+        return self._zip.testzip() is None
 
 
-def _damaged(path: Path, error: Exception) -> OSError:
-    return OSError(None, f"{path.name} is damaged ({error})", str(path))
+@contextmanager
+def opened(path: Path) -> Iterator[Arrays]:
+    """The arrays of a batch file; OSError where it is damaged, also where that comes out as an array is read."""
+    try:
+        with ZipFile(path) as packed:
+            yield Arrays(packed)
+    except OSError:
+        raise
+    except Exception as error:  # zipfile, zlib, json and numpy pass on whatever they met
+        raise OSError(None, f"{path.name} is damaged ({error})", str(path)) from None
 
 
 def verified(path: Path) -> bool:
     """Whether this is a whole batch file of that name, its checksums included."""
     try:
-        with opened(path) as (header, arrays):
-            return header.name == path.stem and arrays.zip.testzip() is None  # type: ignore[attr-defined]
-    except Exception:  # as in `opened`
+        with opened(path) as arrays:
+            return arrays.header.name == path.stem and arrays.are_whole
+    except OSError:
         return False
 
 

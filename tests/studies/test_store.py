@@ -94,7 +94,8 @@ def batch_file(tmp_path):
 
 def test_a_batch_is_read_as_it_was_written(batch_file):
     assert list(batch_file.parent.iterdir()) == [batch_file]
-    with opened(batch_file) as (header, arrays):
+    with opened(batch_file) as arrays:
+        header = arrays.header
         assert (header.name, header.status, header.reason) == ("abc", [0, 5], ["", "too large"])
         for name, values in (CASES | MODEL).items():
             np.testing.assert_array_equal(arrays[name], values)

@@ -328,7 +328,7 @@ def test_nothing_in_a_batch_is_unpickled(batch, tmp_path):
 def test_names_in_an_archive_lead_nowhere(batch):
     repacked(batch, **{"../../outside.npy": npy(np.zeros(3)), "/outside.npy": npy(np.zeros(3))})
     before = sorted(batch.parent.parent.rglob("*"))
-    with opened(batch) as (_, arrays):
+    with opened(batch) as arrays:
         assert arrays["racking"].shape == (2, 3)
     assert sorted(batch.parent.parent.rglob("*")) == before
 
