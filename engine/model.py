@@ -127,13 +127,17 @@ def simulate_cases(
     trace: Callable[[Trace], None] | None = None,
 ) -> Response:
     """March cases that share `model` side by side; motions (n_step + 1, 2) [m/s²] of each. The rest is as in `simulate`."""
-    loads = [(model.weight(spec), model.pressure(spec)) for spec in specs]
+    standing = [(spec.gravity, spec.pressure) for spec in specs]
+    found = {
+        which: (model.weight(spec), model.pressure(spec), model.behind_sections(spec))
+        for which, spec in dict(zip(standing, specs, strict=True)).items()  # many cases have theirs in common
+    }
+    loads = [found[which] for which in standing]
     laws = [model.system.joint_law(model.joint_materials(spec)) for spec in specs]
-    behind = [model.behind_sections(spec) for spec in specs]
-    lanes = Lanes.of([weight + pressure for weight, pressure in loads], laws, list(motions), behind)
+    lanes = Lanes.of([load[0] + load[1] for load in loads], laws, list(motions), [load[2] for load in loads])
     static = [np.zeros_like(lanes.standing), np.zeros_like(lanes.standing)]
-    for lane, pair in enumerate(loads):
-        static[0][:, lane], static[1][:, lane] = pair
+    for lane, (weight, pressure, _) in enumerate(loads):
+        static[0][:, lane], static[1][:, lane] = weight, pressure
     stepper = Stepper(model.system, newmark_of(model.spec), model.rayleigh)
     every = model.spec.output.every
     first = model.frequencies[0]
