@@ -8,7 +8,7 @@ from .assembly import System, rows
 from .kernels import condense
 from .kernels.condense import Condensation, Dashpots, Found
 from .kernels.jit import LANES
-from .kernels.panels import Factor, backward, factor_of, forward
+from .kernels.panels import FIRST, Factor, backward, factor_of, forward
 from .kernels.sparse import product
 from .kernels.states import workspace
 from .mesh import Floats, MeshError
@@ -35,8 +35,8 @@ def factorise(matrix: sp.sparray, n_interior: int) -> Factor:
 
 def solve(factor: Factor, x: Floats) -> Floats:
     """Overwrite x (n, LANES) by the solution for it."""
-    forward(factor, 0, x)
-    backward(factor, 0, x)
+    forward(factor, FIRST, x)
+    backward(factor, FIRST, x)
     return x
 
 

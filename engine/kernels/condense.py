@@ -8,7 +8,7 @@ from .blocks import copy, dot, multiplied
 from .clock import ticks
 from .contact import solve_lane, source_test
 from .jit import LANES, inlined_kernel, kernel
-from .panels import Factor, backward, forward
+from .panels import FIRST, Factor, backward, forward
 from .sparse import Rows, product, subtract_transposed_product
 from .states import Workspace
 from .vector import load, plus_product, store, zeros
@@ -117,7 +117,7 @@ def solve(of, law, n_lane, max_rounds, dashpots, before, found, report, y, clock
     """
     began = ticks()
     start = of.factor.n_interior
-    forward(of.factor, 0, y)
+    forward(of.factor, FIRST, y)
     for i in range(start, y.shape[0]):
         store(of.free, i, load(y, i))
     backward(of.factor, start, of.free)
@@ -135,7 +135,7 @@ def solve(of, law, n_lane, max_rounds, dashpots, before, found, report, y, clock
     forward(of.factor, start, of.tail)
     for i in range(start, y.shape[0]):
         store(y, i, plus_product(load(y, i), 1.0, load(of.tail, i)))
-    backward(of.factor, 0, y)
+    backward(of.factor, FIRST, y)
     clock[SWEEPS] += ticks() - began
     return any_failed
 

@@ -102,9 +102,12 @@ def _free_gaps(g_free, Gl, state, g):
 
 
 @kernel
-def solution(points, kept, state, n_released, anew, g_free, g, lam):
-    """Solve with what `direct` has made ready for these states, and refine while that is called for and helps; the residual."""
-    found, of_gaps, stalled = 0.0, 0.0, NEW_STALLED if anew else STALLED
+def solution(points, kept, state, n_released, stalled, g_free, g, lam):
+    """Solve with what `direct` has made ready for these states, and refine while that is called for; the residual.
+
+    No longer than a solve leaves less than the part `stalled` of it: STALLED or NEW_STALLED.
+    """
+    found, of_gaps = 0.0, 0.0
     for attempt in range(PASSES):
         before = found
         if attempt == 0:
@@ -129,7 +132,8 @@ def direct(points, kept, g_free, state, g, lam):
     for anew in (False, True):
         ready = build(points, inverse, state, work) if anew else hold(points, inverse, state, work)
         n_released = release(points, inverse, state, work) if ready else -1
-        found = np.inf if n_released < 0 else solution(points, kept, state, n_released, anew, g_free, g, lam)
+        stalled = NEW_STALLED if anew else STALLED
+        found = np.inf if n_released < 0 else solution(points, kept, state, n_released, stalled, g_free, g, lam)
         if found <= EQUATION_TOLERANCE:
             break
     return found, n_released

@@ -9,7 +9,7 @@ away. Exact ties are not treated.
 
 import numpy as np
 
-from .direct import direct, product, solution
+from .direct import NEW_STALLED, direct, product, solution
 from .jit import inlined_kernel, kernel
 from .joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK, respond, slip_sign
 
@@ -81,10 +81,10 @@ def follow(points, kept, work, g_free, from_near, state, g, lam):
         _begin_near(points, work, state)
     else:
         _begin_afar(points, work, g_free, state)
-    moved, came_from, forwards = -1, OPEN, True
+    moved, came_from, forwards = np.int64(-1), np.int64(OPEN), True
     for _ in range(MAX_PIECES * state.shape[0]):
         residual, n_released = direct(points, kept, work.far, state, work.far_gap, work.far_force)
-        if not np.isfinite(residual) or not np.isfinite(solution(points, kept, state, n_released, True, g_free, g, lam)):
+        if not np.isfinite(residual) or not np.isfinite(solution(points, kept, state, n_released, NEW_STALLED, g_free, g, lam)):
             return False
         if moved >= 0:
             before = _margin(points, moved, came_from, state[moved], work.far_gap, work.far_force)

@@ -58,7 +58,11 @@ _DIRECTORY = str(cache_directory())
 
 
 def kernel(function: Callable) -> Callable:
-    """Compile `function` at its first call and keep the result in `cache_directory()`."""
+    """Compile `function` at its first call and keep the result in `cache_directory()`.
+
+    A whole number or truth written out as an argument, or what a variable that is one starts from, is a type of its own to numba,
+    for which a kernel of any size would be compiled once more: np.int64(0) is not.
+    """
     return _compiled(function, FLAGS)
 
 

@@ -11,6 +11,9 @@ import numpy as np
 from .jit import kernel
 from .vector import load, plus_product, store, zeros
 
+FIRST = np.int64(0)
+"""The first unknown, in the type of all others (see `kernel`)."""
+
 
 class Factor(NamedTuple):
     """L D Lᵀ by panels. Unknowns from `n_interior` on belong to joints.

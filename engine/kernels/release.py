@@ -5,6 +5,8 @@ equations tells the forces: lambda = H (g_free - slip - gap), and the gaps are s
 sliding one just the shear that friction allows, lambda_s + tie lambda_n = 0. The coefficients of that small system stand in H.
 """
 
+import numpy as np
+
 from .blocks import subtract_rows
 from .dense import factorise, solve
 from .jit import inlined_kernel
@@ -20,7 +22,7 @@ def tie(points, state, p):
 @inlined_kernel
 def _released(points, inverse, state, work):
     """Rows of the inverse whose degrees of freedom `state` releases, into work.queue, with their ties; their number."""
-    count = 0
+    count = np.int64(0)  # see `kernel`
     for k in range(inverse.size[0]):
         p = inverse.point[k]
         if state[p] == STICK:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from engine.kernels.direct import EQUATION_TOLERANCE, direct, product, residual, solution
+from engine.kernels.direct import EQUATION_TOLERANCE, NEW_STALLED, direct, product, residual, solution
 from engine.kernels.joint import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from engine.kernels.states import Points, workspace
 
@@ -85,7 +85,7 @@ def test_new_inverse_that_is_a_seventh_off_is_refined_to_the_end(points):
     n_released = solved(points, memory, state, g_free)[1]
     memory.inverse.matrix[:] *= 0.85
     g, lam = np.zeros((2, 2 * N_POINT))
-    assert solution(points, memory, state, n_released, True, g_free, g, lam) <= EQUATION_TOLERANCE
+    assert solution(points, memory, state, n_released, NEW_STALLED, g_free, g, lam) <= EQUATION_TOLERANCE
     assert_solves(points, state, g_free, g, lam)
 
 
