@@ -9,7 +9,7 @@ from .kernels.condense import take_solution
 from .kernels.jit import LANES
 from .kernels.march import commit_joints
 from .kernels.sparse import product
-from .mesh import Floats
+from .mesh import Floats, MeshError
 from .newmark import Newmark, Rayleigh, Stepper
 from .state import Lanes, State
 
@@ -53,6 +53,7 @@ class _Proximal:
     def __init__(self, system: System, eta: float) -> None:
         self._eta, self._system, self._M = eta, system, rows(system.M)
         self._steppers: dict[int, Stepper] = {}
+        self._softest = SOFTEST
         self._next = State.at_rest(system)
         self._inertia: Floats = np.zeros((system.n_dof, LANES))
 
@@ -68,7 +69,7 @@ class _Proximal:
         for iteration in range(MAX_ITERATIONS):
             if not moving.any():
                 break
-            softer = min(iteration // SOFTENED_EVERY, SOFTEST)
+            softer = self._possible(iteration // SOFTENED_EVERY)
             if iteration % SOFTENED_EVERY == 0:
                 self._stepper(softer).condensed.forget(slice(None))  # or a lane's bits would tell of its companions' iterations
             change, failed = self._iterate(trial, lanes, moving, softer)
@@ -83,6 +84,18 @@ class _Proximal:
         state.motion.u[:, active] = trial.motion.u[:, active]
         commit_joints(lanes.law, lanes.n_lane, trial.contact, state.contact, state.energy)
         return ~(lost | moving)
+
+    def _possible(self, softer: int) -> int:
+        """How many times the term becomes softer: rounding must leave something of it beside the stiffness."""
+        softer = min(softer, self._softest)
+        try:
+            self._stepper(softer)
+        except MeshError:
+            if softer == 0:
+                raise
+            self._softest = softer - 1
+            return self._possible(softer)
+        return softer
 
     def _softened(self, times: int) -> float:
         """eta after it has become softer so many times."""
