@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-import netCDF4
 import numpy as np
 import xarray as xr
 
@@ -11,28 +10,20 @@ from engine import Status
 from engine.recorder import STRESSES
 
 from .messages import StudyError
+from .probe import why_unreadable
 from .provenance import ATTRIBUTES
 from .schema import COORDINATES, EXTREMES, MESH, SCHEMA, Variable
-
-MOST_PACKED = 1032
-"""Bytes that one byte of a zlib stream may stand for: what a file says to hold beyond that is not in it."""
-
-POINTER_BYTES = 8
 
 
 def open_results(path: Path) -> xr.Dataset:
     """The dataset of a results file, read as it is needed; StudyError where it is none, or not as this program writes it."""
     if not path.is_file():
         raise StudyError([f"{path}: there is no such results file; results are written by `coralquake run`"])
+    if reason := why_unreadable(path):
+        raise StudyError([f"{path}: {reason}"])
     try:
-        with netCDF4.Dataset(path) as file:
-            said, size = _said_to_hold(file), path.stat().st_size
-        if said > MOST_PACKED * size:
-            raise StudyError([f"{path}: says to hold {said:,} bytes, which its {size:,} cannot"])
         ds = xr.open_dataset(path, engine="netcdf4")
-    except StudyError:
-        raise
-    except Exception:  # HDF5, netCDF4 and xarray pass on whatever they met
+    except Exception:  # xarray passes on whatever it met
         raise StudyError([f"{path}: is not a netCDF file that can be read"]) from None
     try:
         wrong = next(_wrong(ds), None)
@@ -51,12 +42,6 @@ def read_results(path: Path) -> xr.Dataset:
             return ds.load()
         except Exception as error:
             raise StudyError([f"{path}: {_damaged(error)}"]) from None
-
-
-def _said_to_hold(group: netCDF4.Dataset) -> int:
-    """Bytes of all variables of a group and those in it; the words of one that holds text are not counted."""
-    own = sum(int(v.size) * (POINTER_BYTES if v.dtype is str else v.dtype.itemsize) for v in group.variables.values())
-    return own + sum(map(_said_to_hold, group.groups.values()))
 
 
 def _damaged(error: Exception) -> str:

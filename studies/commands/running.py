@@ -22,6 +22,7 @@ from ..domain_size import convergence_sentences, is_domain_size, source_sentence
 from ..files import is_text
 from ..messages import StudyError, one_line
 from ..plan import Study, shipped_studies
+from ..probe import why_unreadable
 from ..provenance import study_hash
 from ..rerun import rerun as repeat
 from ..runner import Run, Workers, run_into
@@ -257,9 +258,9 @@ def _stopped_by_sigterm() -> Iterator[None]:
 
 def _is_finished(study: Study, path: Path) -> bool:
     """Whether the file holds this very study with no case left that deserves another try."""
-    if not path.is_file():
-        return False
     try:
+        if not path.is_file() or why_unreadable(path):
+            return False
         with xr.open_dataset(path, engine="netcdf4") as ds:
             return ds.attrs.get("study_hash") == study_hash(study) and not (ds["status"] == Status.WORKER_LOST).any()
     except (OSError, ValueError):
