@@ -220,20 +220,23 @@ def _sizes(table: dict[str, Any], mistakes: list[str]) -> DomainSizes | None:
 def _cases(base: Spec, axes: list[Axis], mistakes: list[str], only_values: bool) -> list[Spec]:
     """All combinations of the axes' values; mistakes of single values are found on each axis alone first.
 
-    Where the model itself is wrong (`only_values`) the values are checked by themselves, on the preset.
+    Where there are mistakes, the cases of each axis alone. Where the model itself is wrong (`only_values`) the values are checked
+    by themselves, on the preset, and there are no cases.
     """
-    before = len(mistakes)
     if not axes:
         return [] if only_values else [base]
+    alone: list[Spec | None] = []
     for axis in axes:
         told = len(mistakes)
         for i, settings in enumerate(axis.settings, 1):
-            _case(base, settings, axis.origin, mistakes, only_values)
+            alone.append(_case(base, settings, axis.origin, mistakes, only_values))
             if len(mistakes) - told >= MOST_WRONG and (left := len(axis.settings) - i):
                 mistakes.append(f"{axis.origin}: its other {left:,} values were not looked at")
                 break
-    if only_values or len(mistakes) > before or not all(axis.values for axis in axes):
+    if only_values:
         return []
+    if mistakes or len(axes) == 1:
+        return [case for case in alone if case is not None]
     combinations = product(*(axis.settings for axis in axes))
     found = [_case(base, {k: v for part in parts for k, v in part.items()}, "sweep", mistakes, False) for parts in combinations]
     return [case for case in found if case is not None]
