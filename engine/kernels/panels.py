@@ -8,11 +8,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import kernel
-from .vector import load, plus_product, store, zeros
+from .jit import inlined_kernel, kernel
+from .vector import load, plus_product, prefetch, store, zeros
 
 FIRST = np.int64(0)
 """The first unknown, in the type of all others (see `kernel`)."""
+
+STRIP = 32
+"""Rows of a panel that `backward` takes through all columns before it goes on to the next: they stay in the first cache."""
+
+FAR = 2**20
+"""Numbers of a factor from which on they are asked for ahead of their use; a smaller one lies in the second cache, or the third
+keeps up."""
+
+AHEAD, MOST_AHEAD, LINE = 512, 2048, 8
+"""Numbers between those in use and those that are asked for; most of the panel before; in a line of the caches."""
 
 
 class Factor(NamedTuple):
@@ -74,27 +84,21 @@ def _fill(columns, first_value, indptr, indices, values, dense):
 @kernel
 def forward(factor, start, x):
     """Solve L z = x in place, columns from `start` on: 0 or n_interior."""
-    columns, rows, values = factor.columns, factor.rows, factor.values
+    columns, rows, values, far = factor.columns, factor.rows, factor.values, _is_far(factor)
     for p in range(columns.shape[0] - 1):
         first, end = columns[p], columns[p + 1]
         if first < start:
             continue
         width, at = end - first, factor.first_value[p]
-        for i in range(1, width):
-            total = load(x, first + i)
-            for k in range(i):
-                total = plus_product(total, -values[at + i * width + k], load(x, first + k))
-            store(x, first + i, total)
+        _own_forward(values, at, width, first, x)
         at += width * width
         i, last = factor.first_row[p], factor.first_row[p + 1]
         while i + 3 < last:
+            if far:
+                _ask_for(values, at + AHEAD, at + AHEAD + 4 * width)
             a, b, c, d = load(x, rows[i]), load(x, rows[i + 1]), load(x, rows[i + 2]), load(x, rows[i + 3])
             for k in range(width):
-                column = load(x, first + k)
-                a = plus_product(a, -values[at + k], column)
-                b = plus_product(b, -values[at + width + k], column)
-                c = plus_product(c, -values[at + 2 * width + k], column)
-                d = plus_product(d, -values[at + 3 * width + k], column)
+                a, b, c, d = _less(values, at + k, width, load(x, first + k), a, b, c, d)
             store(x, rows[i], a)
             store(x, rows[i + 1], b)
             store(x, rows[i + 2], c)
@@ -113,39 +117,127 @@ def forward(factor, start, x):
 @kernel
 def backward(factor, start, x):
     """Solve D Lᵀ u = x in place, rows from the last down to `start`: 0 or n_interior."""
-    columns, rows, values, inverse = factor.columns, factor.rows, factor.values, factor.inverse_pivots
+    columns, rows, values, inverse, far = factor.columns, factor.rows, factor.values, factor.inverse_pivots, _is_far(factor)
     for p in range(columns.shape[0] - 2, -1, -1):
         first, end = columns[p], columns[p + 1]
         if first < start:
             break
         width, own = end - first, factor.first_value[p]
-        below = own + width * width
-        k = 0
-        while k + 3 < width:
-            j, at = first + k, below + k
-            a, b = plus_product(zeros(), inverse[j], load(x, j)), plus_product(zeros(), inverse[j + 1], load(x, j + 1))
-            c, d = plus_product(zeros(), inverse[j + 2], load(x, j + 2)), plus_product(zeros(), inverse[j + 3], load(x, j + 3))
-            for i in range(factor.first_row[p], factor.first_row[p + 1]):
-                row = load(x, rows[i])
-                a = plus_product(a, -values[at], row)
-                b = plus_product(b, -values[at + 1], row)
-                c = plus_product(c, -values[at + 2], row)
-                d = plus_product(d, -values[at + 3], row)
-                at += width
-            store(x, j, a)
-            store(x, j + 1, b)
-            store(x, j + 2, c)
-            store(x, j + 3, d)
-            k += 4
-        while k < width:
-            a, at = plus_product(zeros(), inverse[first + k], load(x, first + k)), below + k
-            for i in range(factor.first_row[p], factor.first_row[p + 1]):
-                a = plus_product(a, -values[at], load(x, rows[i]))
-                at += width
-            store(x, first + k, a)
-            k += 1
-        for k in range(width - 2, -1, -1):
-            total = load(x, first + k)
-            for i in range(k + 1, width):
-                total = plus_product(total, -values[own + i * width + k], load(x, first + i))
-            store(x, first + k, total)
+        if far and p > 0:
+            before = factor.first_value[p - 1]
+            _ask_for(values, before, min(own, before + MOST_AHEAD))
+        at, last = own + width * width, factor.first_row[p + 1]
+        if width < 4:
+            for k in range(width):
+                total = plus_product(zeros(), inverse[first + k], load(x, first + k))
+                for i in range(factor.first_row[p], last):
+                    total = plus_product(total, -values[at + k + (i - factor.first_row[p]) * width], load(x, rows[i]))
+                store(x, first + k, total)
+        else:
+            for j in range(first, end):
+                store(x, j, plus_product(zeros(), inverse[j], load(x, j)))
+            for begin in range(factor.first_row[p], last, STRIP):
+                _strip_backward(values, at, width, first, rows, begin, min(begin + STRIP, last), far, x)
+                at += STRIP * width
+        _own_backward(values, own, width, first, x)
+
+
+@inlined_kernel
+def _is_far(factor):
+    """Whether the factor is too large for the caches next to the core."""
+    return factor.values.shape[0] > FAR
+
+
+@inlined_kernel
+def _ask_for(values, at, end):
+    """Have the values from `at` to `end` brought to the caches."""
+    for k in range(at, end, LINE):
+        prefetch(values, k)
+
+
+@inlined_kernel
+def _less(values, at, step, row, a, b, c, d):
+    """Four rows less the products of one with four values that are `step` apart."""
+    a, b = plus_product(a, -values[at], row), plus_product(b, -values[at + step], row)
+    return a, b, plus_product(c, -values[at + 2 * step], row), plus_product(d, -values[at + 3 * step], row)
+
+
+@inlined_kernel
+def _own_forward(values, at, width, first, x):
+    """Solve for the unknowns of a panel's own columns, once the columns before have been taken off."""
+    i = 0
+    while i + 3 < width:
+        j, row = first + i, at + i * width
+        a, b, c, d = load(x, j), load(x, j + 1), load(x, j + 2), load(x, j + 3)
+        for k in range(i):
+            a, b, c, d = _less(values, row + k, width, load(x, first + k), a, b, c, d)
+        row += i
+        b = plus_product(b, -values[row + width], a)
+        c = plus_product(plus_product(c, -values[row + 2 * width], a), -values[row + 2 * width + 1], b)
+        d = plus_product(plus_product(d, -values[row + 3 * width], a), -values[row + 3 * width + 1], b)
+        d = plus_product(d, -values[row + 3 * width + 2], c)
+        store(x, j, a)
+        store(x, j + 1, b)
+        store(x, j + 2, c)
+        store(x, j + 3, d)
+        i += 4
+    while i < width:
+        a = load(x, first + i)
+        for k in range(i):
+            a = plus_product(a, -values[at + i * width + k], load(x, first + k))
+        store(x, first + i, a)
+        i += 1
+
+
+@inlined_kernel
+def _strip_backward(values, at, width, first, rows, begin, end, far, x):
+    """Take the products with a strip of a panel's rows, whose values begin at `at`, off the unknowns of its columns."""
+    k = 0
+    while k + 3 < width:
+        j, row = first + k, at + k
+        a, b, c, d = load(x, j), load(x, j + 1), load(x, j + 2), load(x, j + 3)
+        for i in range(begin, end):
+            if far and k == 0:
+                _ask_for(values, row + STRIP * width, row + (STRIP + 1) * width)
+            a, b, c, d = _less(values, row, 1, load(x, rows[i]), a, b, c, d)
+            row += width
+        store(x, j, a)
+        store(x, j + 1, b)
+        store(x, j + 2, c)
+        store(x, j + 3, d)
+        k += 4
+    while k < width:
+        a, row = load(x, first + k), at + k
+        for i in range(begin, end):
+            a = plus_product(a, -values[row], load(x, rows[i]))
+            row += width
+        store(x, first + k, a)
+        k += 1
+
+
+@inlined_kernel
+def _own_backward(values, at, width, first, x):
+    """Solve for the unknowns of a panel's own columns, once the rows below have been taken off."""
+    k = width
+    while k > 3:
+        k -= 4
+        j, row = first + k, at + (k + 4) * width + k
+        a, b, c, d = load(x, j), load(x, j + 1), load(x, j + 2), load(x, j + 3)
+        for i in range(k + 4, width):
+            a, b, c, d = _less(values, row, 1, load(x, first + i), a, b, c, d)
+            row += width
+        row = at + k * width + k
+        c = plus_product(c, -values[row + 3 * width + 2], d)
+        b = plus_product(plus_product(b, -values[row + 3 * width + 1], d), -values[row + 2 * width + 1], c)
+        a = plus_product(plus_product(a, -values[row + 3 * width], d), -values[row + 2 * width], c)
+        a = plus_product(a, -values[row + width], b)
+        store(x, j, a)
+        store(x, j + 1, b)
+        store(x, j + 2, c)
+        store(x, j + 3, d)
+    while k > 0:
+        k -= 1
+        a = load(x, first + k)
+        for i in range(k + 1, width):
+            a = plus_product(a, -values[at + i * width + k], load(x, first + i))
+        store(x, first + k, a)

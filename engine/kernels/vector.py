@@ -85,6 +85,22 @@ def _everywhere(builder: Any, number: Any) -> Any:
     return builder.shuffle_vector(one, _NOTHING, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
+def _prefetch(typing: Any, x: Any, at: Any) -> tuple[Any, Callable]:
+    """Ask for what stands around x[at] to be brought to the caches; `at` may be beyond the end."""
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        bytes_, word = ir.IntType(8).as_pointer(), ir.IntType(32)
+        first = context.make_array(signature.args[0])(context, builder, args[0]).data
+        kind = ir.FunctionType(ir.VoidType(), [bytes_, word, word, word])
+        ask = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        builder.call(
+            ask, [builder.bitcast(builder.gep(first, [args[1]]), bytes_), word(0), word(2), word(1)]
+        )  # to read data, soon
+        return context.get_dummy_value()
+
+    return types.void(x, types.int64), code
+
+
 def _zeros(typing: Any) -> tuple[Any, Callable]:
     """A vector of zeros."""
 
@@ -112,5 +128,8 @@ if _CONFIG.DISABLE_JIT:  # the same in plain Python
         """A vector of zeros."""
         return np.zeros(LANES)
 
+    def prefetch(x, at):
+        """Nothing that plain Python could do."""
+
 else:
-    load, store, plus_product, zeros = (intrinsic(of) for of in (_load, _store, _plus_product, _zeros))
+    load, store, plus_product, zeros, prefetch = (intrinsic(of) for of in (_load, _store, _plus_product, _zeros, _prefetch))

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engine.kernels.jit import LANES
-from engine.kernels.panels import backward, factor_of, forward
+from engine.kernels.panels import FAR, FIRST, STRIP, backward, factor_of, forward
 
 # Sums of some ten products in the same order: units in the last place.
 ROUNDING = 1e-14
@@ -83,6 +83,25 @@ def test_sweeps_solve_any_factor(n, density, seed):
     backward(factor, 0, x)
     A = L @ np.diag(D) @ L.T
     np.testing.assert_allclose(x, np.linalg.solve(A, b), atol=1e-15 * n * np.linalg.cond(A) * max(1, abs(x).max()))
+
+
+WIDE = 700
+
+
+@pytest.mark.parametrize("below", [0, 1, 5, STRIP, STRIP + 3, 2 * STRIP + 1, WIDE])
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 5, 7, 8, 19, WIDE])
+def test_panels_of_any_width_and_height(width, below):
+    """Four columns or rows at a time and those that are left over; the largest factor lies beyond the caches."""
+    n, rng = width + below, np.random.default_rng(width)
+    L, D = np.tril(rng.uniform(-1, 1, (n, n)), -1) / n + np.eye(n), rng.uniform(0.5, 2, n)
+    factor, b = as_factor(L, D, width), rng.normal(size=(n, LANES))
+    assert (len(factor.values) > FAR) == (width == below == WIDE)
+    x = b.copy()
+    forward(factor, FIRST, x)
+    z = np.linalg.solve(L, b)
+    np.testing.assert_allclose(x, z, rtol=0.0, atol=10 * ROUNDING)
+    backward(factor, FIRST, x)
+    np.testing.assert_allclose(x, np.linalg.solve(L.T, z / D[:, None]), rtol=0.0, atol=10 * ROUNDING)
 
 
 def test_sweeps_of_the_trailing_block_leave_the_rest_alone(pieces):
