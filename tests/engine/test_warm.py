@@ -1,10 +1,13 @@
 """Kernels are compiled before processes start: what the runner calls afterwards is compiled already."""
 
+import gc
 import subprocess
 import sys
 
 import numba
 import pytest
+
+from engine import compile_kernels
 
 CHECK = """
 import numpy as np
@@ -54,3 +57,13 @@ def test_a_batch_calls_no_kernel_in_a_form_that_was_not_compiled():
     assert done.returncode == 0, done.stderr
     before, after = map(int, done.stdout.split())
     assert before == 0 < after
+
+
+@pytest.mark.parametrize("collected", [True, False])
+def test_garbage_is_collected_afterwards_as_before(collected, monkeypatch):
+    monkeypatch.setattr(gc, "isenabled", lambda: collected)
+    done = []
+    monkeypatch.setattr(gc, "disable", lambda: done.append("off"))
+    monkeypatch.setattr(gc, "enable", lambda: done.append("on"))
+    compile_kernels.__wrapped__()
+    assert done == (["off", "on"] if collected else ["off"])
