@@ -6,6 +6,7 @@ import numpy as np
 
 from .assembly import System, rows
 from .kernels.condense import take_solution
+from .kernels.contact import FOLLOW_AFTER
 from .kernels.jit import LANES
 from .kernels.march import commit_joints
 from .kernels.sparse import product
@@ -24,6 +25,10 @@ goes an even step an iteration until it lies on, the longer the softer the term.
 
 SOFTEST, HARDEST = 3, 3
 """Times that it becomes softer, and a hundred times harder where the joints find no solution: they then have less far to go."""
+
+PATH_WORK = 4e6
+"""Over the cube of the number of joint points: iterations of a lane in a load step whose joints may be solved along a path, or
+not at all. One takes 5 s for 93 points where the path is long; a lane that needs more of them is given up."""
 
 
 def equilibrium(system: System, lanes: Lanes, loads: list[Floats], first_frequency: float) -> tuple[State, np.ndarray]:
@@ -54,6 +59,7 @@ class _Proximal:
         self._eta, self._system, self._M = eta, system, rows(system.M)
         self._steppers: dict[int, Stepper] = {}
         self._softest = SOFTEST
+        self._most_paths = max(1.0, PATH_WORK / max(1, len(system.points)) ** 3)
         self._next = State.at_rest(system)
         self._inertia: Floats = np.zeros((system.n_dof, LANES))
 
@@ -65,6 +71,7 @@ class _Proximal:
         scale = np.linalg.norm(lanes.standing, axis=0)
         moving = active.copy()
         lost = np.zeros(LANES, dtype=bool)
+        paths = np.zeros(LANES, dtype=int)
         trial = state.copy()
         for iteration in range(MAX_ITERATIONS):
             if not moving.any():
@@ -72,15 +79,16 @@ class _Proximal:
             softer = self._possible(iteration // SOFTENED_EVERY)
             if iteration % SOFTENED_EVERY == 0:
                 self._stepper(softer).condensed.forget(slice(None))  # or a lane's bits would tell of its companions' iterations
-            change, failed = self._iterate(trial, lanes, moving, softer)
+            change, failed = self._iterate(trial, lanes, moving, softer, paths)
             for harder in range(1, HARDEST + 1):
                 if not (again := moving & failed).any():
                     break
                 self._stepper(softer - harder).condensed.forget(slice(None))
-                forces, failed = self._iterate(trial, lanes, again, softer - harder)
+                forces, failed = self._iterate(trial, lanes, again, softer - harder, paths)
                 change = np.where(again, forces, change)
-            lost |= moving & failed
-            moving &= ~(failed | (change <= TOLERANCE * scale))
+            settled = change <= TOLERANCE * scale
+            lost |= moving & (failed | (~settled & (paths > self._most_paths)))
+            moving &= ~(lost | settled)
         state.motion.u[:, active] = trial.motion.u[:, active]
         commit_joints(lanes.law, lanes.n_lane, trial.contact, state.contact, state.energy)
         return ~(lost | moving)
@@ -108,13 +116,24 @@ class _Proximal:
             self._steppers[softer] = Stepper(self._system, step, Rayleigh())
         return self._steppers[softer]
 
-    def _iterate(self, trial: State, lanes: Lanes, moving: np.ndarray, softer: int) -> tuple[Floats, np.ndarray]:
-        """One proximal step of the lanes that move, their slip as it was; norm of eta M (u⁺ - u), and where it failed."""
+    def _iterate(
+        self, trial: State, lanes: Lanes, moving: np.ndarray, softer: int, paths: np.ndarray
+    ) -> tuple[Floats, np.ndarray]:
+        """One proximal step of the lanes that move, their slip as it was; norm of eta M (u⁺ - u), and where it failed.
+
+        paths : (LANES,) counts those of them that were solved along a path, or not at all
+        """
         following, rest = self._next, np.zeros((2, LANES))
         for mine, theirs in zip((*following.motion, *following.contact), (*trial.motion, *trial.contact), strict=True):
             mine[:] = theirs
+        for theirs in following.motion:
+            theirs[:, ~moving] = 0.0  # at rest and without load: what has settled or has no solution is not solved again
+        for theirs in following.contact:
+            theirs[~moving] = 0
         failed = np.zeros(LANES, dtype=bool)
-        failed[list(self._stepper(softer).attempt(following, lanes, rest, rest))] = True
+        stepper, loaded = self._stepper(softer), replace(lanes, standing=np.where(moving, lanes.standing, 0.0))
+        failed[list(stepper.attempt(following, loaded, rest, rest))] = True
+        paths += moving & (failed | (stepper.of.report.rounds > FOLLOW_AFTER))
         step, done = following.motion.u - trial.motion.u, moving & ~failed
         trial.motion.u[:, done] = following.motion.u[:, done]
         for lane in np.flatnonzero(done[: lanes.n_lane]).tolist():

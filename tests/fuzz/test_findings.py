@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine import Spec, build_model
+from engine import Spec, Status, build_model, static
 from engine.spec import Damping, Gravity, Joint, MeshOptions, Pressure, Time
+from studies import make_study, run_study
 from tests.fuzz.against_reference import Verdict, told_steps
 from tests.fuzz.examine import Depth, examine
 from tests.fuzz.models import Drawn
@@ -42,3 +43,13 @@ def test_models_that_were_found_wanting_are_so_no_more(path):
     seed, number = map(int, path.stem.split("-"))
     found = examine(Drawn(seed, number, tomllib.loads(path.read_text()), ()), Depth(reference=True))
     assert found.findings == []
+
+
+def test_a_lane_that_needs_too_many_paths_is_given_up(monkeypatch):
+    """Each may take seconds on a large mesh, and a load step has 500 iterations (model 1225 of seed 2: over five minutes)."""
+    table = tomllib.loads((Path(__file__).parent / "found" / "1-6714.toml").read_text())
+    assert run_study(make_study(table), workers=1)["status"].values.ravel().tolist() == [Status.DONE]
+    monkeypatch.setattr(static, "PATH_WORK", 0.0)
+    ended = run_study(make_study(table), workers=1)
+    assert ended["status"].values.ravel().tolist() == [Status.NO_EQUILIBRIUM]
+    assert ended["reason"].values.ravel()[0]
