@@ -131,8 +131,8 @@ class Run:
 
     @property
     def n_done(self) -> int:
-        """How many of the entries have ended."""
-        return sum(1 for entry in self._entries.values() if entry.status)
+        """How many of the entries have ended; a file that a process wrote just before the run was stopped is one."""
+        return sum(1 for entry in self._entries.values() if entry.status or self.store.path(entry.name).exists())
 
     def _find(self, batch: Batch, on_disk: set[str]) -> None:
         """Sort a batch in; one of which parts are there is these parts."""

@@ -211,12 +211,12 @@ def complaints(caplog):
     return [record.getMessage() for record in caplog.records if record.name == cluster.__name__]
 
 
-def test_workers_with_other_versions_are_named(scheduler, monkeypatch, caplog):
-    """Those that are left out are, and where no other one is left, the run stops."""
+def test_workers_with_other_versions_are_named(monkeypatch, caplog):
+    """Those that are left out are, and where no other one is left, the run stops: two workers that no test has ended."""
     monkeypatch.setattr(cluster, "computer", lambda: computer() | {"numpy": "0.1"})
     said = rf"worker tcp://\S+: would compute other bits: numpy {re.escape(computer()['numpy'])}, here 0.1"
-    with pytest.raises(ClusterError, match=f"^{said}$"):
-        worked(Cluster(scheduler, doubled), [1])
+    with local(n_workers=2) as there, pytest.raises(ClusterError, match=f"^{said}$"):
+        worked(Cluster(there.scheduler_address, doubled), [1])
     assert [bool(re.fullmatch(f"{said}; it is left out", line)) for line in complaints(caplog)] == [True]
 
 
