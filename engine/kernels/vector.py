@@ -93,9 +93,8 @@ def _prefetch(typing: Any, x: Any, at: Any) -> tuple[Any, Callable]:
         first = context.make_array(signature.args[0])(context, builder, args[0]).data
         kind = ir.FunctionType(ir.VoidType(), [bytes_, word, word, word])
         ask = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
-        builder.call(
-            ask, [builder.bitcast(builder.gep(first, [args[1]]), bytes_), word(0), word(2), word(1)]
-        )  # to read data, soon
+        reading, soon, data = word(0), word(2), word(1)
+        builder.call(ask, [builder.bitcast(builder.gep(first, [args[1]]), bytes_), reading, soon, data])
         return context.get_dummy_value()
 
     return types.void(x, types.int64), code
