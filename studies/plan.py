@@ -1,7 +1,7 @@
 """From a study file to cases, and from cases to batches of lanes: TOML -> Study -> cases -> batches."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -220,31 +220,36 @@ def _sizes(table: dict[str, Any], mistakes: list[str]) -> DomainSizes | None:
 def _cases(base: Spec, axes: list[Axis], mistakes: list[str], only_values: bool) -> list[Spec]:
     """All combinations of the axes' values; mistakes of single values are found on each axis alone first.
 
-    Where there are mistakes, the cases of each axis alone. Where the model itself is wrong (`only_values`) the values are checked
-    by themselves, on the preset, and there are no cases.
+    Values of several axes need fit together in their combinations only. Where there are mistakes, the cases of each axis alone.
+    Where the model itself is wrong (`only_values`) the values are checked by themselves, on the preset, and there are no cases.
     """
     if not axes:
         return [] if only_values else [base]
-    alone: list[Spec | None] = []
-    for axis in axes:
-        told = len(mistakes)
-        for i, settings in enumerate(axis.settings, 1):
-            alone.append(_case(base, settings, axis.origin, mistakes, only_values))
-            if len(mistakes) - told >= MOST_WRONG and (left := len(axis.settings) - i):
-                mistakes.append(f"{axis.origin}: its other {left:,} values were not looked at")
-                break
+    alone = [case for axis in axes for case in _each(base, axis.settings, axis.origin, mistakes, only_values or len(axes) > 1)]
     if only_values:
         return []
     if mistakes or len(axes) == 1:
-        return [case for case in alone if case is not None]
-    combinations = product(*(axis.settings for axis in axes))
-    found = [_case(base, {k: v for part in parts for k, v in part.items()}, "sweep", mistakes, False) for parts in combinations]
-    return [case for case in found if case is not None]
+        return alone
+    combinations = [{k: v for part in parts for k, v in part.items()} for parts in product(*(axis.settings for axis in axes))]
+    return list(_each(base, combinations, "sweep", mistakes, only_values=False))
+
+
+def _each(base: Spec, settings: Sequence[Mapping[str, Any]], lead: str, mistakes: list[str], only_values: bool) -> Iterator[Spec]:
+    """The base with each of the settings made that can be made, until too many cannot."""
+    told = len(mistakes)
+    for i, one in enumerate(settings, 1):
+        case = _case(base, one, lead, mistakes, only_values)
+        if case is not None:
+            yield case
+        if len(mistakes) - told >= MOST_WRONG and (left := len(settings) - i):
+            mistakes.append(f"{lead}: {left:,} more were not looked at")
+            return
 
 
 def _case(base: Spec, settings: Mapping[str, Any], lead: str, mistakes: list[str], only_values: bool) -> Spec | None:
     """The base with the settings made, or what forbids it, as mistakes that begin with `lead`."""
-    table = base.model_dump()
+    touched = {name.split(".")[0] for name in settings}
+    table = {**dict(base), **base.model_dump(include=touched)}  # the other tables are validated already
     for name, value in settings.items():
         *path, last = name.split(".")
         part: Any = table

@@ -136,6 +136,31 @@ def test_cases_run_through_the_grid_with_the_last_axis_fastest():
     assert study.label(1) == "scale = 1, p0 = 1 MPa, damping_ratio = 0.05"
 
 
+def test_values_of_several_axes_need_fit_together_in_their_combinations_only():
+    study = study_of(
+        '[sweep]\ndomain_depth = ["20 m", "30 m"]\n"box.depth" = ["5 m", "12 m"]'
+    )  # 12 m + 4 m > 14 m, the preset's depth
+    assert [(case.domain.depth, case.box.depth) for case in study.cases] == [(20, 5), (20, 12), (30, 5), (30, 12)]
+    assert study.cases == tuple(
+        study_of(f'[domain]\ndepth = "{domain} m"\n[box]\ndepth = "{box} m"').cases[0] for domain in (20, 30) for box in (5, 12)
+    )
+
+
+def test_combinations_that_do_not_fit_are_mistakes():
+    with pytest.raises(StudyError) as error:
+        study_of('[sweep]\ndomain_depth = ["15 m", "30 m"]\n"box.depth" = ["5 m", "12 m"]')
+    assert error.value.mistakes == [
+        "quick.toml: sweep: box.depth = 12 m: box's floor at 16 m must lie above domain.depth = 15 m",
+    ]
+
+
+def test_of_very_many_mistakes_the_rest_is_counted_only():
+    with pytest.raises(StudyError) as error:
+        study_of(f"[sweep]\ndamping_ratio = {list(range(2, 5002))}")
+    assert len(error.value.mistakes) < 10
+    assert error.value.mistakes[-1] == "quick.toml: sweep.damping_ratio: 4,000 more were not looked at"
+
+
 @pytest.mark.parametrize(
     "sweep",
     [
