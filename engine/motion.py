@@ -1,6 +1,7 @@
 """What reaches the base: the records and generated motions of a spec, cut, resampled and scaled. Values in m/s²."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ def base_motion(spec: Spec, records: Mapping[str, GroundMotion]) -> NDArray[np.f
         try:
             values = _prepared(spec, records, name, direction)
             factor = factor if peak is None else values.scale_to(peak)
-            scaled = _scaled(values, factor * motion.scale)[: len(result)]
+            scaled = _scaled(values, factor * motion.scale)
         except MotionError as error:
             raise MotionError(f'motion.{field} = "{name}": {error}') from None
         result[: len(scaled), direction] = scaled
@@ -42,12 +43,13 @@ def _scaled(values: GroundMotion, factor: float) -> NDArray[np.float64]:
 
 
 def _prepared(spec: Spec, records: Mapping[str, GroundMotion], name: str, direction: int) -> GroundMotion:
-    """At the step of the spec: the wavelet as it is, anything else cut, tapered and resampled."""
+    """At the step of the spec and no longer: the wavelet as it is, anything else cut, tapered and resampled."""
     time = spec.time
+    n = round(time.duration / time.dt) + 1
     if name == "ricker":
-        return ricker(spec.ricker, time.dt, round(time.duration / time.dt) + 1)
-    if name == "synthetic":
-        return synthetic(spec.synthetic, time.duration, direction).cut(time.duration).resampled(time.dt)
-    if name not in records:
+        return ricker(spec.ricker, time.dt, n)
+    if name != "synthetic" and name not in records:
         raise MotionError(f"{name}: there is no such record")
-    return records[name].cut(time.duration).resampled(time.dt)
+    motion = synthetic(spec.synthetic, time.duration, direction) if name == "synthetic" else records[name]
+    at_step = motion.cut(time.duration).resampled(time.dt)
+    return replace(at_step, acceleration=at_step.acceleration[:n])  # its last step may reach beyond the duration

@@ -78,6 +78,14 @@ def test_peak_is_that_of_what_is_left_after_cut_and_taper(pair):
     assert abs(motion[:, 0]).max() == pytest.approx(2.0, rel=1e-14)
 
 
+@pytest.mark.parametrize("duration", [0.004, 0.008, 0.012])
+def test_peak_is_reached_where_the_record_s_last_step_reaches_beyond_the_duration(duration):
+    """A record that grows has its peak there; found by fuzzing."""
+    growing = {"h": GroundMotion("h.AT2", 0.01, np.arange(20.0) ** 2)}
+    motion = base_motion(spec(Time(dt=0.002, duration=duration), vertical_record="none", peak=1.5, scale=-2.0), growing)
+    assert abs(motion[:, 0]).max() == pytest.approx(3.0, rel=1e-14)
+
+
 def test_short_record_is_followed_by_rest(pair):
     motion = base_motion(spec(Time(dt=0.01, duration=15.0), peak=1.0), pair)
     assert motion.shape == (1501, 2)
