@@ -47,11 +47,11 @@ class ConvergenceError(RuntimeError):
 
 @dataclass(frozen=True)
 class Trace:
-    """One step of the first lane: number, time [s], joint states (n_point,), direct solves, residual, whether it was halved."""
+    """One step of the first lane: number, time [s], its state by itself, direct solves, residual, whether it was halved."""
 
     step: int
     time: float
-    states: np.ndarray
+    state: State
     rounds: int
     residual: float
     halved: bool
@@ -204,7 +204,7 @@ class _Run:
         """What the first lane did in a step that was advanced alone, or what it is before the first one."""
         report = self.stepper.of.report
         found = (int(report.rounds[0]), float(report.residual[0]), bool(self.halved[0])) if step else (0, 0.0, False)
-        return Trace(step, step * self.stepper.newmark.dt, self.state.contact.state[0].copy(), *found)
+        return Trace(step, step * self.stepper.newmark.dt, self.state.alone(0), *found)
 
     def advance(self, first: int, end: int) -> None:
         """The steps from `first` up to `end`, not included, of all lanes, and what is read from them."""

@@ -26,10 +26,10 @@ from tests.fuzz.models import Drawn, as_toml, draw
 
 FOLDER = Path("results/fuzz")
 
-REFERENCE_EVERY, RELATIONS_EVERY, REORDERED_EVERY, WORKERS_EVERY = 20, 40, 40, 200
+REFERENCE_EVERY, READING_EVERY, RELATIONS_EVERY, REORDERED_EVERY, WORKERS_EVERY = 20, 20, 40, 40, 200
 """Models between two that are asked this, too."""
 
-EVERYTHING = Depth(reference=True, relations=True, reordered=True, workers=True)
+EVERYTHING = Depth(reference=True, reading=True, relations=True, reordered=True, workers=True)
 
 MOST_SECONDS = 300
 """Of one model; then the process ends itself and says where it was."""
@@ -42,6 +42,7 @@ def depth_of(number: int) -> Depth:
     """What model `number` is asked beyond its own results."""
     return Depth(
         reference=number % REFERENCE_EVERY == 0,
+        reading=number % READING_EVERY == 10,
         relations=number % RELATIONS_EVERY == 1,
         reordered=number % REORDERED_EVERY == 2,
         workers=number % WORKERS_EVERY == 3,

@@ -18,12 +18,13 @@ from tests.fuzz.against_reference import Verdict, told_steps
 from tests.fuzz.checks import emptiness, held, imbalances, statuses
 from tests.fuzz.metamorphic import Compared, mirrored, relations
 from tests.fuzz.models import Drawn, Table
+from tests.fuzz.read_anew import misread
 
 INSTANTS = (1, 2, 5, 15, 40)
 """Steps that the reference goes along."""
 
 MOST_COMPARED = 3
-"""Cases of a model that the reference goes along with."""
+"""Cases of a model that the reference goes along with, and that are read anew."""
 
 LARGEST_FOR_REFERENCE = 900
 LARGEST_FOR_RELATIONS = 1500
@@ -53,6 +54,7 @@ class Depth:
     """What is asked of a model beyond its own results."""
 
     reference: bool = False
+    reading: bool = False
     relations: bool = False
     reordered: bool = False
     workers: bool = False
@@ -86,6 +88,8 @@ def _ask(found: Examined, study: Study, ds: xr.Dataset, depth: Depth) -> None:
         found.ended[_how(model, spec, status, found)] += 1
     if depth.reference and model().system.n_dof <= LARGEST_FOR_REFERENCE:
         _ask_reference(found, study, model())
+    if depth.reading and model().system.n_dof <= LARGEST_FOR_REFERENCE:
+        _ask_reading(found, study, ds, model())
     if depth.relations and model().system.n_dof <= LARGEST_FOR_RELATIONS:
         _ask_relations(found, study, model())
     if depth.reordered:
@@ -112,6 +116,14 @@ def _ask_reference(found: Examined, study: Study, model: Model) -> None:
     steps = told_steps(model, [study.cases[i] for i in cases], [study.ground(i) for i in cases], INSTANTS)
     found.told.update(f"step {step.verdict}" for step in steps)
     found.findings += [f"{step.where}: {step.detail}" for step in steps if step.verdict == Verdict.WRONG]
+
+
+def _ask_reading(found: Examined, study: Study, ds: xr.Dataset, model: Model) -> None:
+    ended = statuses(ds)
+    done = [case for case in study.scaling.solved if ended[case] < Status.NOT_CONVERGED]
+    if study.cases[0].motion.reference_depth is None:  # else the base moves otherwise than the record
+        found.findings += misread(study, ds, model, done[:MOST_COMPARED])
+        found.told["case read anew"] += len(done[:MOST_COMPARED])
 
 
 def _ask_relations(found: Examined, study: Study, model: Model) -> None:

@@ -9,11 +9,13 @@ import pytest
 from engine import Status, build_model, simulate_cases
 from engine.kernels import loop
 from studies import StudyError, make_study, run_study
+from studies.schema import SCHEMA
 from tests.fuzz.__main__ import depth_of
 from tests.fuzz.checks import bounds, emptiness, held, imbalances, statuses
 from tests.fuzz.examine import LOST, REFUSED, examine, summed
 from tests.fuzz.extremes import SMALL, extreme_tables, with_field
 from tests.fuzz.models import as_toml, draw
+from tests.fuzz.read_anew import misread
 
 SEED, MODELS = 1, 200
 
@@ -58,6 +60,7 @@ def test_reference_and_relations_have_their_say(examined):
     for relation in ("N and cm", "mirror", "translation", "twice as thick", "layer in two", "times 3", "superposition"):
         assert told[f"{relation} holds"] >= 2
     assert told["lanes in another order, record at its own rate"] >= 4
+    assert told["case read anew"] > 10
 
 
 def test_a_model_is_its_study_file():
@@ -101,6 +104,59 @@ def test_an_imbalance_that_rounding_does_not_explain_is_found(small):
     assert ds.residual.values <= limit.residual[0] < 1e-12
     spoilt = ds.assign(energy_error=ds.energy_error + 1e-3, residual=ds.residual + 1e-6)
     assert len(imbalances(study, spoilt, lambda: model)) == 2
+
+
+NOT_READ_ANEW = {
+    "racking_free_field",
+    "reference_displacement",
+    "peak_racking_free_field",
+    "flexibility_ratio",
+    "response_spectrum",
+    "iterations",
+    "residual",
+    "source_test",
+    "energy_error",
+    "contact_drift",
+    "status",
+    "reason",
+    "solved_as",
+    "scaled_by",
+}
+"""Variables of the free field, of the motion or of the solver, which other tests are for."""
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    """A box that slides and opens, with a case that follows from it, and what reads them anew."""
+    motion = {**SMALL["motion"], "peak": "6 m/s**2"}
+    loads = {"motion": motion, "gravity": {"self_weight": False}, "sweep": {"p0": ["20 kPa", "10 kPa"], "scale": [1.0, 0.5]}}
+    study = make_study({**SMALL, **loads, "joint": {"thickness": "1 m"}})
+    ds = run_study(study, workers=1)
+    assert study.scaling.followers == {0: [3]}
+    assert float(ds.slip_work.max()) > 0
+    assert float(ds.max_opening.max()) > 0
+    assert np.isfinite(ds.first_slip).any()
+    model = build_model(study.cases[0])
+    return ds, lambda spoilt: misread(study, spoilt, model, [0])
+
+
+def test_what_a_march_gives_is_read_anew_as_the_dataset_says_it(shaken):
+    ds, read = shaken
+    assert read(ds) == []
+
+
+@pytest.mark.parametrize("name", sorted(SCHEMA.keys() - NOT_READ_ANEW))
+@pytest.mark.parametrize("case", [0, -1], ids=["solved", "follows"])
+def test_a_variable_that_differs_from_its_march_in_the_sixth_digit_is_found(name, case, shaken):
+    """The largest value of the case, in one place."""
+    ds, read = shaken
+    spoilt = ds.copy(deep=True)
+    values, of_case = spoilt[name].values, np.zeros(spoilt[name].shape, dtype=bool)
+    of_case[tuple(case if axis in ("p0", "scale") else slice(None) for axis in spoilt[name].dims)] = True
+    at = np.nanargmax(np.where(of_case, abs(values), -1))
+    assert values.flat[at] != 0
+    values.flat[at] = (values.flat[at] + 1) % 4 if SCHEMA[name].flags else values.flat[at] * (1 + 1e-5)
+    assert [line for line in read(spoilt) if name in line]
 
 
 def test_what_nothing_holds_is_told_from_what_friction_holds():
