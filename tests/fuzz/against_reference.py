@@ -20,27 +20,30 @@ class Verdict(StrEnum):
     WRONG = "wrong"
 
 
-Told = namedtuple("Told", "where verdict detail")
+Told = namedtuple("Told", "where halved verdict detail")
 Around = namedtuple("Around", "before after ground lane halved missed")
 """A lane's moments before and after a step, base acceleration at both, whether it was halved, by how much [m] its gaps are
 missed."""
 
 
-def told_steps(model: Model, specs: list[Spec], motions: list[np.ndarray], instants: tuple[int, ...]) -> list[Told]:
-    """March the cases from their static state, and judge the steps that end at `instants` (those that there are).
+def told_steps(
+    model: Model, specs: list[Spec], motions: list[np.ndarray], instants: tuple[int, ...], last: int | None = None
+) -> list[Told]:
+    """March the cases from their static state up to step `last`, or the last of `instants`; judge the steps that end at these
+    (those that there are), and all that were halved.
 
     A step that no halving solves is the engine's own word.
     """
     twin, (lanes, loads) = twin_of_model(model), lanes_of(model, specs, motions)
     told = []
-    for k, before, after, halved, stepper, state in marched(model, twin, lanes, loads, len(specs), max(instants)):
+    for k, before, after, halved, stepper, state in marched(model, twin, lanes, loads, len(specs), last or max(instants)):
         report = stepper.of.report
-        for lane in range(len(specs)) if k in instants else ():
-            if report.rounds[lane] > 0:
+        for lane in range(len(specs)):
+            if report.rounds[lane] > 0 and (k in instants or halved[lane]):
                 ends = lanes.ground[k - 1 : k + 1, :, lane]
                 missed = report.residual[lane] * _size_of_gaps(state, stepper, lane)
                 around = Around(before[lane], after[lane], ends, lane, bool(halved[lane]), missed)
-                told.append(Told(f"case {lane}, step {k}", *_verdict(model, twin, lanes, specs[lane], around)))
+                told.append(Told(f"case {lane}, step {k}", around.halved, *_verdict(model, twin, lanes, specs[lane], around)))
     return told
 
 
