@@ -125,6 +125,8 @@ def _read_knet(name: str, text: str) -> GroundMotion:
         raise MotionError(f"{name}: is a K-NET record, which obspy reads: pip install obspy") from None
     except Exception as error:  # obspy passes on whatever its parser met
         raise MotionError(f"{name}: is not laid out as K-NET records are: {' '.join(str(error).split())[:200]}") from None
+    if len(trace.data) == 0:
+        raise MotionError(f"{name}: ends with its header")
     if abs(len(trace.data) * dt - duration) > 1:
         raise MotionError(f"{name}: holds {len(trace.data) * dt:g} s, its header says {duration:g} s")
     with np.errstate(over="ignore", invalid="ignore"):

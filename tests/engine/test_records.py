@@ -187,7 +187,8 @@ def test_knet_with_line_ends_of_windows_and_an_empty_last_line(file):
         (knet(COUNTS, maximum="nan"), "its header says nan gal"),
         (knet(COUNTS, duration=108), "record.txt: holds 10 s, its header says 108 s"),
         ("\n".join(knet(COUNTS).split("\n")[:60]), "record.txt: holds 3.44 s, its header says 10 s"),
-        ("\n".join(knet(COUNTS).split("\n")[:17]), "record.txt: holds 0 s, its header says 10 s"),
+        ("\n".join(knet(COUNTS).split("\n")[:17]), "record.txt: ends with its header"),
+        ("\n".join(knet(COUNTS, duration=1).split("\n")[:17]), "record.txt: ends with its header"),
         ("\n".join(knet(COUNTS).split("\n")[:9]), "without the last line of its header, 'Memo.'"),
         (
             knet(COUNTS).replace("-18000", "-18a00", 1),
