@@ -19,6 +19,9 @@ from .walls import with_sections
 SLIVER = 0.25
 """An outermost column or row thinner than this part of the regular size is joined to its neighbour."""
 
+SAME_LENGTH = 1e-9
+"""Relative difference up to which two joint elements are of one length; differences of coordinates leave less."""
+
 
 @dataclass(frozen=True)
 class Grading:
@@ -312,10 +315,19 @@ def _boundaries(grid: _Grid, nodes: Floats) -> dict[str, Ints]:
 
 def _joint_groups(first: Floats, second: Floats, layer: Ints, spec: Spec) -> tuple[tuple[tuple[int, float], ...], Ints]:
     """Joint materials: a layer each, or a layer and element length each where the thickness depends on the length."""
-    lengths = np.linalg.norm(second - first, axis=1)
-    keys = [(int(i), float(round(h, 9)) if spec.joint.thickness_ratio else 0.0) for i, h in zip(layer, lengths, strict=True)]
+    lengths = _alike(np.linalg.norm(second - first, axis=1)) if spec.joint.thickness_ratio else np.zeros(len(layer))
+    keys = list(zip(layer.tolist(), lengths.tolist(), strict=True))
     groups = tuple(sorted(set(keys)))
     return groups, np.array([groups.index(key) for key in keys], dtype=np.int64)
+
+
+def _alike(lengths: Floats) -> Floats:
+    """The lengths to twelve digits, those that differ by their rounding alone as one."""
+    order = np.argsort(lengths)
+    begins = np.concatenate([[True], np.diff(lengths[order]) > SAME_LENGTH * lengths[order][1:]])
+    found = np.empty_like(lengths)
+    found[order] = np.array([float(f"{length:.12g}") for length in lengths[order][begins]])[np.cumsum(begins) - 1]
+    return found
 
 
 def _with_named_points(mesh: Mesh, spec: Spec) -> Mesh:

@@ -105,7 +105,7 @@ def assert_joints(spec: Spec, found: BoxMesh, ground: np.ndarray, structure: np.
         layer, element_length = found.joint_groups[group]
         assert layer == edges[frozenset(joint[:2])]
         assert edges[frozenset(joint[2:4])] == len(spec.layer)
-        assert element_length == (pytest.approx(h, abs=1e-9) if spec.joint.thickness_ratio else 0.0)  # lengths are grouped so
+        assert element_length == (pytest.approx(h, rel=1e-9) if spec.joint.thickness_ratio else 0.0)  # lengths are grouped so
 
 
 def assert_pressed_all_round(spec: Spec, mesh: Mesh, structure: np.ndarray) -> None:
@@ -324,6 +324,18 @@ def test_joint_materials_are_those_of_the_layers_met():
 def test_joint_materials_by_length(paper_spec):
     """Walls in layer 3 in elements of 0.5 and 1.5 m, roof and floor in elements of 0.5 and 1 m."""
     assert set(box_mesh(paper_spec).joint_groups) == {(1, 0.5), (1, 1.0), (2, 0.5), (2, 1.5), (3, 0.5), (3, 1.0)}
+
+
+def test_joint_materials_by_length_of_a_box_of_less_than_a_micrometre(paper_spec):
+    """Lengths are told apart by their ratio, not to a nanometre; found by fuzzing."""
+    small = {"box": ("width", "height", "wall", "depth"), "domain": ("width", "depth")}
+    small |= {"mesh": ("first", "largest_width", "largest_height")}
+    table = paper_spec.model_dump()
+    for name, fields in small.items():
+        table[name] |= {field: 1.3e-8 * table[name][field] for field in fields}
+    table["layer"] = [layer | {"bottom": 1.3e-8 * layer["bottom"]} for layer in table["layer"]]
+    found = {(layer, round(length / 1.3e-8, 6)) for layer, length in box_mesh(Spec.model_validate(table)).joint_groups}
+    assert found == set(box_mesh(paper_spec).joint_groups)
 
 
 @pytest.mark.parametrize("options", [MeshOptions(), PLAIN_MESH], ids=["recommended", "plain"])
