@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 import xarray as xr
 
-from engine import Model, Spec, simulate_cases
+from engine import Model, Spec, base_motion, simulate_cases
 from engine.mesh import Mesh, Section
 from engine.model import materials
 from studies import Study
@@ -25,6 +25,9 @@ ROUNDING = 1e-12
 
 STATIC = 1e-8
 """Of the loads, left in the equilibrium before the shaking: a hundred times what the static stage leaves in a step."""
+
+MARCHED = 1e-9
+"""Of the largest displacement, between two marches of one linear system."""
 
 Film = namedtuple("Film", "time u v a gap force damped slip state")
 """Every step from t = 0: time [s], motion (n_time, 2 n_node), joints (n_time, n_point, 2), slip and state (n_time, n_point)."""
@@ -68,13 +71,15 @@ def misread(study: Study, ds: xr.Dataset, model: Model, cases: list[int]) -> lis
         spec, ground = study.cases[case], study.ground(case)
         reading = _Reading(_case(study, ds, case), spec.output.every)
         film = _filmed(model, spec, ground)
-        _read_base(reading, spec, ground)
+        _read_base(reading, study, spec, ground)
         _read_model(reading, model, twin)
+        _read_materials(reading, model, spec)
         _read_static(reading, model, spec, twin, film)
         _read_points(reading, model.system.mesh, materials(spec), film)
         _read_joints(reading, model, spec, twin, film)
         _read_racking(reading, model.system.mesh, film)
         _read_sections(reading, model, spec, twin, film, ground)
+        _read_free_field(reading, model, spec, ground)
         found += [f"case {case}: {line}" for line in reading.wrong]
     return found + [line for case in cases for line in _followers_misread(study, ds, case)]
 
@@ -105,16 +110,17 @@ def _filmed(model: Model, spec: Spec, ground: np.ndarray) -> Film:
 # ---- motion, model, static state ----
 
 
-def _read_base(reading: _Reading, spec: Spec, ground: np.ndarray) -> None:
+def _read_base(reading: _Reading, study: Study, spec: Spec, ground: np.ndarray) -> None:
     """What is known without a march: the base moves as the study says, to the peaks that it names; the water lifts the box."""
     motion, box = spec.motion, spec.box
-    wanted = [motion.peak, motion.vertical_peak] if motion.record != "none" else [None, None]
-    if motion.vertical_record == motion.record == "ricker" and motion.vertical_peak is None:
-        wanted[1] = motion.peak
-    for direction, peak in enumerate(wanted):
-        reached = abs(ground[:, direction]).max()
-        if peak is not None and abs(reached / (peak * abs(motion.scale)) - 1) > 1e-9:
-            reading.wrong.append(f"base_acceleration: reaches {reached:g} m/s² in direction {direction}")
+    plain = motion.model_copy(update={"peak": None, "vertical_peak": None, "scale": 1.0})
+    unscaled = base_motion(spec.model_copy(update={"motion": plain}), study.motions)
+    size = abs(unscaled).max(axis=0)
+    across = 1.0 if motion.peak is None or size[0] == 0 else motion.peak / size[0]
+    upwards = across if motion.vertical_peak is None or size[1] == 0 else motion.vertical_peak / size[1]
+    expected = unscaled * [across, upwards] * motion.scale
+    if not np.allclose(ground, expected, rtol=1e-12, atol=0):
+        reading.wrong.append("base_acceleration: does not have the peaks that the study names")
     reading.compare("base_acceleration", ground[:: reading.every])
     reading.compare("peak_base_acceleration", abs(ground).max(axis=0))
     hollow = (box.width - 2 * box.wall) * (box.height - 2 * box.wall)
@@ -136,6 +142,24 @@ def _read_model(reading: _Reading, model: Model, twin: Twin) -> None:
     w, damping = 2 * np.pi * reading.ds.frequency.values[:2], model.rayleigh
     if not np.allclose(damping.alpha / (2 * w) + damping.beta * w / 2, model.spec.damping.ratio, rtol=1e-9, atol=0):
         reading.wrong.append("damping: its coefficients do not give the ratio at the first two frequencies")
+
+
+def _read_materials(reading: _Reading, model: Model, spec: Spec) -> None:
+    """Ground is of the layer in which its middle lies, joints take their stiffness and friction from the ground beside them."""
+    mesh, joints = model.system.mesh, model.joint_materials(spec)
+    depth, ends = -mesh.nodes[mesh.triangles[:, :3], 1].mean(axis=1), [layer.bottom for layer in spec.layer[:-1]]
+    layer_of = np.where(mesh.structure, len(spec.layer), np.searchsorted(ends, depth))
+    if not np.array_equal(layer_of, mesh.material):
+        reading.wrong.append("materials: triangles are not of the layers in which they lie")
+    for nodes, group in zip(mesh.joints, mesh.joint_material, strict=True):
+        (beside,) = np.flatnonzero(np.isin(mesh.triangles[:, :3], nodes[:2]).sum(axis=1) == 2)
+        layer, joint = spec.layer[layer_of[beside]], spec.joint
+        E, nu = layer.E, layer.nu
+        length = np.linalg.norm(mesh.nodes[nodes[1]] - mesh.nodes[nodes[0]])
+        thickness = joint.thickness if joint.thickness_ratio is None else joint.thickness_ratio * length
+        wanted = [E * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / thickness, E / (2 * (1 + nu)) / thickness, layer.friction]
+        if not np.allclose([joints[group].k_n, joints[group].k_s, joints[group].mu], wanted, rtol=1e-9, atol=0):
+            reading.wrong.append(f"materials: the joint between nodes {nodes} is not that of the ground beside it")
 
 
 def _read_static(reading: _Reading, model: Model, spec: Spec, twin: Twin, film: Film) -> None:
@@ -250,8 +274,49 @@ def _read_racking(reading: _Reading, mesh: Mesh, film: Film) -> None:
     k = int(np.argmin(abs(film.time - float(ds.shape_time))))
     if abs(racking.value).max() - abs(racking.value[k]) > ROUNDING * racking.magnitude.max():
         reading.wrong.append("shape_time: is not when the racking was largest")
+    reading.compare("shape_time", film.time[k])
     reading.compare("shape", film.u[k].reshape(-1, 2), ROUNDING * abs(film.u[k]).max())
     reading.compare("shape_state", film.state[k])
+
+
+def _read_free_field(reading: _Reading, model: Model, spec: Spec, ground: np.ndarray) -> None:
+    """The ground without the box: three-node triangles that move alike at every depth are linear elements of one dimension."""
+    mesh, damping = model.system.mesh, model.rayleigh
+    if mesh.order == 2:
+        return
+    y = np.unique(mesh.nodes[mesh.boundaries["left"], 1])
+    h, middle = np.diff(y), (y[:-1] + y[1:]) / 2
+    layers = [next((layer for layer in spec.layer if -at < layer.bottom), spec.layer[-1]) for at in middle]
+    rho, G = (np.array([getattr(layer, name) for layer in layers]) for name in ("rho", "shear_modulus"))
+    lumped = spec.mesh.mass == "lumped"
+    K, M = (_chain(G / h, [[1, -1], [-1, 1]]), _chain(rho * h / 6, [[3, 0], [0, 3]] if lumped else [[2, 1], [1, 2]]))
+    load = -np.outer(ground[:, 0], M.sum(axis=1))[:, 1:]  # of the whole rows: the base moves, too
+    K, M = K[1:, 1:], M[1:, 1:]
+    C, time = damping.alpha * M + damping.beta * K, spec.time
+    a0, a1 = 1 / (time.newmark_beta * time.dt**2), time.newmark_gamma / (time.newmark_beta * time.dt)
+    u = v = np.zeros(len(K))
+    a, inverse, history = np.linalg.solve(M, load[0]), np.linalg.inv(a0 * M + a1 * C + K), [u]
+    for force in load[1:]:
+        u_free = u + time.dt * v + time.dt**2 * (0.5 - time.newmark_beta) * a
+        v_free = v + time.dt * (1 - time.newmark_gamma) * a
+        u = inverse @ (force + M @ (a0 * u_free) + C @ (a1 * u_free - v_free))
+        v, a = v_free + a1 * (u - u_free), a0 * (u - u_free)
+        history.append(u)
+    moved = np.pad(np.array(history), ((0, 0), (1, 0)))
+    heights = -spec.box.depth, -spec.box.depth - spec.box.height
+    roof, invert = (np.array([np.interp(height, y, each) for each in moved]) for height in heights)
+    racking, allowed = roof - invert, MARCHED * abs(moved).max()
+    reading.compare("racking_free_field", racking[:: reading.every], allowed)
+    reading.compare("peak_racking_free_field", abs(racking).max(), allowed)
+    reading.compare("reference_displacement", np.zeros(reading.ds.reference_displacement.shape))  # at the base
+
+
+def _chain(factor: np.ndarray, block: list[list[int]]) -> np.ndarray:
+    """Elements in a row, each a factor times the block (2, 2)."""
+    whole = np.zeros((len(factor) + 1,) * 2)
+    for i, times in enumerate(factor):
+        whole[i : i + 2, i : i + 2] += times * np.array(block)
+    return whole
 
 
 # ---- joints ----
@@ -300,6 +365,7 @@ def _read_sections(reading: _Reading, model: Model, spec: Spec, twin: Twin, film
         reading.compare_history(name, Linear(value[..., i], magnitude[..., i]))
     allowed = ROUNDING * magnitude.max(axis=0)
     moments = abs(film.time - reading.ds.extreme_time.values[..., None]).argmin(axis=-1)
+    reading.compare("extreme_time", film.time[moments])
     for which in range(6):
         of, way = which // 2, (1, -1)[which % 2]
         for s, k in enumerate(moments[:, which]):
@@ -384,7 +450,7 @@ def _followers_misread(study: Study, ds: xr.Dataset, case: int) -> Iterator[str]
     for other in study.scaling.followers.get(case, ()):
         follower = _case(study, ds, other)
         reading = _Reading(follower, study.cases[other].output.every)
-        _read_base(reading, study.cases[other], study.ground(other))
+        _read_base(reading, study, study.cases[other], study.ground(other))
         yield from (f"case {other}: {line}" for line in reading.wrong)
         factor, loads = float(follower.scaled_by), []
         for each in (case, other):

@@ -1,5 +1,6 @@
 """Two hundred random models, the ends of what floats hold, and poison in the midst: never a quiet wrong number."""
 
+import re
 import tomllib
 from collections import Counter
 
@@ -107,9 +108,7 @@ def test_an_imbalance_that_rounding_does_not_explain_is_found(small):
 
 
 NOT_READ_ANEW = {
-    "racking_free_field",
     "reference_displacement",
-    "peak_racking_free_field",
     "flexibility_ratio",
     "response_spectrum",
     "iterations",
@@ -122,7 +121,7 @@ NOT_READ_ANEW = {
     "solved_as",
     "scaled_by",
 }
-"""Variables of the free field, of the motion or of the solver, which other tests are for."""
+"""Variables of the box or the motion by itself, of the solver, and what is zero here: other tests are for them."""
 
 
 @pytest.fixture(scope="module")
@@ -145,18 +144,19 @@ def test_what_a_march_gives_is_read_anew_as_the_dataset_says_it(shaken):
     assert read(ds) == []
 
 
-@pytest.mark.parametrize("name", sorted(SCHEMA.keys() - NOT_READ_ANEW))
 @pytest.mark.parametrize("case", [0, -1], ids=["solved", "follows"])
-def test_a_variable_that_differs_from_its_march_in_the_sixth_digit_is_found(name, case, shaken):
-    """The largest value of the case, in one place."""
+def test_variables_that_differ_from_the_march_in_the_sixth_digit_are_found(case, shaken):
+    """In one place each, the largest value of the case."""
     ds, read = shaken
-    spoilt = ds.copy(deep=True)
-    values, of_case = spoilt[name].values, np.zeros(spoilt[name].shape, dtype=bool)
-    of_case[tuple(case if axis in ("p0", "scale") else slice(None) for axis in spoilt[name].dims)] = True
-    at = np.nanargmax(np.where(of_case, abs(values), -1))
-    assert values.flat[at] != 0
-    values.flat[at] = (values.flat[at] + 1) % 4 if SCHEMA[name].flags else values.flat[at] * (1 + 1e-5)
-    assert [line for line in read(spoilt) if name in line]
+    spoilt, names = ds.copy(deep=True), SCHEMA.keys() - NOT_READ_ANEW
+    for name in names:
+        values, of_case = spoilt[name].values, np.zeros(spoilt[name].shape, dtype=bool)
+        of_case[tuple(case if axis in ("p0", "scale") else slice(None) for axis in spoilt[name].dims)] = True
+        at = np.nanargmax(np.where(of_case, abs(values), -1))
+        assert values.flat[at] != 0, name
+        values.flat[at] = (values.flat[at] + 1) % 4 if SCHEMA[name].flags else values.flat[at] * (1 + 1e-5)
+    lines = read(spoilt)
+    assert [name for name in names if not any(re.match(rf"case {case % 4}: {name}\b", line) for line in lines)] == []
 
 
 def test_what_nothing_holds_is_told_from_what_friction_holds():
