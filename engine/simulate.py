@@ -56,6 +56,11 @@ class Trace:
     residual: float
     halved: bool
 
+    @property
+    def states(self) -> np.ndarray:
+        """Joint states (n_point,)."""
+        return self.state.contact.state[0]
+
 
 @dataclass(frozen=True)
 class Response:

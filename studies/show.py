@@ -15,8 +15,7 @@ TRACE_HEAD = f"{'step':>7} {'time [s]':>10} {'open':>5} {'stick':>5} {'slip':>5}
 
 def trace_line(step: Trace, model: Model) -> str:
     """One step: joint points that are open, stick and slip, direct solves, relative residual, and whether it was halved."""
-    states = step.state.contact.state[0]
-    count = [int((states == 0).sum()), int((states == 1).sum()), int((states > 1).sum())]
+    count = [int((step.states == 0).sum()), int((step.states == 1).sum()), int((step.states > 1).sum())]
     digits = max(0, -int(np.floor(np.log10(model.spec.time.dt))) + 1)
     line = (
         f"{step.step:7d} {step.time:10.{digits}f} {count[0]:5d} {count[1]:5d} {count[2]:5d} {step.rounds:6d} {step.residual:9.1e}"

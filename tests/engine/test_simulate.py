@@ -439,7 +439,7 @@ def test_trace_tells_every_step_of_the_first_lane(stepper, response, every):
     told, found = traced(stepper, motions, every=every)
     assert [step.step for step in told] == list(range(N_STEP + 1))
     np.testing.assert_allclose([step.time for step in told], response.time, rtol=1e-15)
-    np.testing.assert_array_equal([step.state.contact.state[0] for step in told], response.states[2])
+    np.testing.assert_array_equal([step.states for step in told], response.states[2])
     assert max(step.rounds for step in told) == response.iterations[2]
     assert max(step.residual for step in told) == response.residual[2]
     assert not any(step.halved for step in told)
@@ -450,7 +450,7 @@ def test_trace_tells_every_step_of_the_first_lane(stepper, response, every):
 def test_trace_begins_with_the_static_state(stepper, response):
     told, _ = traced(stepper, MOTIONS)
     assert (told[0].step, told[0].time, told[0].rounds, told[0].residual, told[0].halved) == (0, 0.0, 0, 0.0, False)
-    np.testing.assert_array_equal(told[0].state.contact.state[0] == OPEN, response.static_open[0])
+    np.testing.assert_array_equal(told[0].states == OPEN, response.static_open[0])
     assert all(step.rounds >= 1 for step in told[1:])
 
 
@@ -465,7 +465,7 @@ def test_trace_ends_where_the_first_lane_fails(failing, response):
     told, found = traced(failing(parts=False, lane=0), MOTIONS)
     assert found.status.tolist() == [Status.NOT_CONVERGED, Status.DONE, Status.DONE, Status.DONE]
     assert [step.step for step in told] == list(range(30))
-    np.testing.assert_array_equal([step.state.contact.state[0] for step in told], response.states[0, :30])
+    np.testing.assert_array_equal([step.states for step in told], response.states[0, :30])
 
 
 def test_trace_does_not_end_where_another_lane_fails(stepper):

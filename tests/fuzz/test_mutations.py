@@ -64,7 +64,7 @@ FOUND = {
     "one value 15,000 times": (f"{SHORT}[sweep]\nscale = [{'1, ' * 15_000}]", "sweep.scale: holds 1 twice"),
     "20,000 wrong values": (
         f'{SHORT}[sweep]\nbox_width = {{ from = "-2 m", to = "-1 m", num = 20000 }}',
-        "sweep.box_width: its other 19,000 values were not looked at",
+        "sweep.box_width: 19,000 more were not looked at",
     ),
 }
 

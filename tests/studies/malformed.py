@@ -693,7 +693,7 @@ RECORDS = [
     broken(
         "K-NET, cut in its values", "a.EW", KNET.replace("Time(s)  1\n", "Time(s)  9\n"), "", "holds 1 s, its header says 9 s"
     ),
-    broken("K-NET without values", "a.EW", KNET[: KNET.index("Memo.") + 20], "", "ends with its header"),
+    broken("K-NET without values", "a.EW", KNET[: KNET.index("Memo.") + 6], "", "ends with its header"),
     broken("K-NET, other scale", "a.EW", KNET.replace("1000(gal)", "2000(gal)"), "", "reaches 100 gal, its header says 50 gal"),
     broken("K-NET, letter in a value", "a.EW", KNET.replace("-50", "-5O", 1), "", "is not laid out as K-NET records are"),
     broken("K-NET with a unit", "a.EW", KNET, UNIT, "is a K-NET record and states its own time step and unit"),

@@ -1,6 +1,7 @@
 """What a results file is and what a case does, in lines: everything is named, with its unit, and no number is made up."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -186,8 +187,9 @@ def test_a_study_without_a_file_or_a_record_is_told(tmp_path):
 # trace ---------------------------------------------------------------------------------------------------------------------
 
 
-def step(**changes):
-    facts = {"step": 7, "time": 0.07, "states": np.array([0, 1, 1, 2, 3, 3]), "rounds": 4, "residual": 3.2e-16, "halved": False}
+def step(states=(0, 1, 1, 2, 3, 3), **changes):
+    state = SimpleNamespace(contact=SimpleNamespace(state=np.array([states])))
+    facts = {"step": 7, "time": 0.07, "state": state, "rounds": 4, "residual": 3.2e-16, "halved": False}
     return Trace(**facts | changes)
 
 
