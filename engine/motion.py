@@ -10,6 +10,9 @@ from .groundmotion import GroundMotion, MotionError
 from .spec import Spec
 from .synthetic import ricker, synthetic
 
+NEGLIGIBLE = 1e-60
+"""Of the largest base acceleration: less, as in the tail of a wavelet, is zero. The squares of what it moves would vanish."""
+
 
 def base_motion(spec: Spec, records: Mapping[str, GroundMotion]) -> NDArray[np.float64]:
     """Base acceleration (n_step + 1, 2) in x and y: the motion of each direction scaled to its peak, times the scale.
@@ -31,6 +34,7 @@ def base_motion(spec: Spec, records: Mapping[str, GroundMotion]) -> NDArray[np.f
         except MotionError as error:
             raise MotionError(f'motion.{field} = "{name}": {error}') from None
         result[: len(scaled), direction] = scaled
+    result[abs(result) < NEGLIGIBLE * abs(result).max()] = 0.0
     return result
 
 
