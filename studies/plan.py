@@ -29,6 +29,9 @@ NOT_OF_A_SPEC = ("title", "model", "sweep", "domain_size")
 MOST_WRONG = 1000
 """Values of an axis that may be wrong before its others are no longer looked at."""
 
+MOST_LOOKED_AT = 10_000
+"""Values of an axis that are looked at where the study is wrong already: that takes half a second."""
+
 
 @dataclass(frozen=True)
 class Batch:
@@ -235,13 +238,14 @@ def _cases(base: Spec, axes: list[Axis], mistakes: list[str], only_values: bool)
 
 
 def _each(base: Spec, settings: Sequence[Mapping[str, Any]], lead: str, mistakes: list[str], only_values: bool) -> Iterator[Spec]:
-    """The base with each of the settings made that can be made, until too many cannot."""
+    """The base with each of the settings made that can be made, until too much is wrong."""
     told = len(mistakes)
     for i, one in enumerate(settings, 1):
         case = _case(base, one, lead, mistakes, only_values)
         if case is not None:
             yield case
-        if len(mistakes) - told >= MOST_WRONG and (left := len(settings) - i):
+        enough = len(mistakes) - told >= MOST_WRONG or (told and i == MOST_LOOKED_AT)
+        if enough and (left := len(settings) - i):
             mistakes.append(f"{lead}: {left:,} more were not looked at")
             return
 

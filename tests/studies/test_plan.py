@@ -161,6 +161,15 @@ def test_of_very_many_mistakes_the_rest_is_counted_only():
     assert error.value.mistakes[-1] == "quick.toml: sweep.damping_ratio: 4,000 more were not looked at"
 
 
+def test_of_a_study_that_is_wrong_already_ten_thousand_values_are_looked_at():
+    with pytest.raises(StudyError) as error:
+        study_of('[sweep]\np0 = [{ from = "0 Pa", to = "1 MPa", num = 10_001 }, "1 bogus"]')
+    assert error.value.mistakes == [
+        "quick.toml: sweep.p0 = \"1 bogus\": unit 'bogus' is not known; must be a unit like Pa",
+        "quick.toml: sweep.p0: 1 more were not looked at",
+    ]
+
+
 @pytest.mark.parametrize(
     "sweep",
     [
