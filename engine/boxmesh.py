@@ -11,6 +11,7 @@ from math import ceil, exp, log
 
 import numpy as np
 
+from .alike import classes
 from .bisection import refined
 from .mesh import SIDES, Flags, Floats, Ints, Mesh, compacted
 from .spec import SAME_LINE, Box, Layer, MeshOptions, Spec
@@ -323,11 +324,8 @@ def _joint_groups(first: Floats, second: Floats, layer: Ints, spec: Spec) -> tup
 
 def _alike(lengths: Floats) -> Floats:
     """The lengths to twelve digits, those that differ by their rounding alone as one."""
-    order = np.argsort(lengths)
-    begins = np.concatenate([[True], np.diff(lengths[order]) > SAME_LENGTH * lengths[order][1:]])
-    found = np.empty_like(lengths)
-    found[order] = np.array([float(f"{length:.12g}") for length in lengths[order][begins]])[np.cumsum(begins) - 1]
-    return found
+    _, first, of = np.unique(classes(lengths, SAME_LENGTH), return_index=True, return_inverse=True)
+    return np.array([float(f"{length:.12g}") for length in lengths[first]])[of]
 
 
 def _with_named_points(mesh: Mesh, spec: Spec) -> Mesh:

@@ -39,7 +39,7 @@ class Model:
 
     def weight(self, spec: Spec) -> Floats:
         """Self-weight load (n_dof,)."""
-        return self.system.weight * (spec.gravity.acceleration if spec.gravity.self_weight else 0.0)
+        return self.system.weight * spec.gravity.acting
 
     def pressure(self, spec: Spec) -> Floats:
         """Water pressure load (n_dof,): p = p0 depth / reference_height on the box's outer face, inward."""
@@ -47,8 +47,7 @@ class Model:
 
     def behind_sections(self, spec: Spec) -> Floats:
         """Part (3 n_section,) of weight and pressure behind each section."""
-        gravity = spec.gravity.acceleration if spec.gravity.self_weight else 0.0
-        return self.sections.loads(gravity, self._depth_ratio(spec) * spec.pressure.p0)
+        return self.sections.loads(spec.gravity.acting, self._depth_ratio(spec) * spec.pressure.p0)
 
     def _depth_ratio(self, spec: Spec) -> Floats:
         """Depth of every node over the height at which the pressure is p0, (n_node,)."""

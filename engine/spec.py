@@ -242,6 +242,11 @@ class Gravity(Section):
     self_weight: Annotated[bool, Field(strict=True, description="whether it acts")] = True
     acceleration: Quantity("m/s**2", "gravity", gt=0) = 9.81
 
+    @property
+    def acting(self) -> float:
+        """[m/s²] The acceleration, zero without self-weight."""
+        return self.acceleration if self.self_weight else 0.0
+
 
 class Output(Section):
     """What is kept."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from engine import Spec
+from engine.alike import classes
 
 SAME = 64 * 2.0**-52
 """Relative difference up to which two loads are one: a value of a logarithmic range is ten to a rounded exponent, which leaves
@@ -52,7 +53,7 @@ def scaling_of(cases: Sequence[Spec]) -> Scaling:
     loads = np.array([_loads(spec) for spec in cases])
     size = np.abs(loads).max(axis=1)
     direction = loads / np.where(size > 0, size, 1.0)[:, None]
-    ratios = np.column_stack([_classes(values) for values in direction.T]).tolist()
+    ratios = np.column_stack([classes(values, SAME) for values in direction.T]).tolist()
     groups: dict[Hashable, list[int]] = {}
     for case, (spec, ratio) in enumerate(zip(cases, ratios, strict=True)):
         groups.setdefault((_unloaded(spec), *ratio), []).append(case)
@@ -72,21 +73,10 @@ def _loads(spec: Spec) -> tuple[float, float, float, float]:
     horizontal = own if motion.record != "none" else 0.0
     vertical = motion.vertical_peak if motion.vertical_peak is not None else own
     vertical = vertical if motion.vertical_record != "none" else 0.0
-    gravity = spec.gravity.acceleration if spec.gravity.self_weight else 0.0
-    return spec.pressure.p0, horizontal * motion.scale, vertical * motion.scale, gravity
+    return spec.pressure.p0, horizontal * motion.scale, vertical * motion.scale, spec.gravity.acting
 
 
 def _unloaded(spec: Spec) -> Hashable:
     """All that decides the response but the sizes of the loads; a peak and a record's own size are amplitudes in two units."""
     sizes: Any = {"pressure": {"p0"}, "motion": {"peak", "vertical_peak", "scale"}, "gravity": True}
     return spec.model_dump_json(exclude=sizes), spec.motion.peak is None, spec.motion.vertical_peak is None
-
-
-def _classes(values: np.ndarray) -> np.ndarray:
-    """Of each value (n,) the number of its class; the next class begins where two neighbours are further apart than SAME."""
-    order = np.argsort(values)
-    ordered = values[order]
-    apart = np.diff(ordered) > SAME * np.maximum(np.abs(ordered[1:]), np.abs(ordered[:-1]))
-    classes = np.zeros(len(values), dtype=int)
-    classes[order[1:]] = np.cumsum(apart)
-    return classes
