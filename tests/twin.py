@@ -41,6 +41,16 @@ def twin_of_model(model):
     return twin_of(model.system, materials(spec), held, spec.joint.quadrature, spec.mesh.mass == "lumped")
 
 
+def gravity_of(spec):
+    """What weighs box and ground down [m/s²]."""
+    return spec.gravity.acceleration if spec.gravity.self_weight else 0.0
+
+
+def water_on(mesh, spec):
+    """Water pressure (n_node,) at the depth of every node."""
+    return -mesh.nodes[:, 1] / spec.pressure.reference_height * spec.pressure.p0
+
+
 def difference(a, b):
     """Largest difference, relative to the largest entry of b."""
     return abs(a - b).max() / max(abs(b).max(), 1e-300)

@@ -79,14 +79,14 @@ def examine(drawn: Drawn, depth: Depth) -> Examined:
 
 
 def _ask(found: Examined, study: Study, ds: xr.Dataset, depth: Depth) -> None:
-    model = cache(lambda: build_model(study.cases[0]))  # few need it again
+    ended, model = statuses(ds), cache(lambda: build_model(study.cases[0]))  # few need it again
     found.findings += emptiness(ds) + imbalances(study, ds, model)
     for name in FIGURES if study.cases[0].time.newmark_gamma == 0.5 else FIGURES[:2]:
         values = ds[name].values[np.isfinite(ds[name].values)]
         found.worst[name] = float(values.max(initial=0.0))
-    for spec, status in zip(study.cases, statuses(ds), strict=True):
+    for spec, status in zip(study.cases, ended, strict=True):
         found.ended[_how(model, spec, status, found)] += 1
-    halved = [case for case in study.scaling.solved if statuses(ds)[case] == Status.SUBSTEPS]  # rare
+    halved = [case for case in study.scaling.solved if ended[case] == Status.SUBSTEPS]  # rare
     if (depth.reference or halved) and model().system.n_dof <= LARGEST_FOR_REFERENCE:
         _ask_reference(found, study, model(), halved)
     if depth.reading and model().system.n_dof <= LARGEST_FOR_REFERENCE:

@@ -32,6 +32,7 @@ from engine import (
 )
 from engine.mesh import SIDES
 from engine.model import materials
+from tests.twin import gravity_of, water_on
 
 UNIT = 2.0**-53
 MULTIPLE = 10
@@ -227,14 +228,6 @@ def _posed(model: Model, spec: Spec, ground: Floats, system: System, gravity: fl
     return Posed(system, newmark_of(spec), model.rayleigh, float(model.frequencies[0]), *loads, law, ground)
 
 
-def _gravity(spec: Spec) -> float:
-    return spec.gravity.acceleration if spec.gravity.self_weight else 0.0
-
-
-def _pressure(model: Model, spec: Spec) -> Floats:
-    return -model.system.mesh.nodes[:, 1] / spec.pressure.reference_height * spec.pressure.p0
-
-
 def _in_n_and_cm(model: Model, spec: Spec, ground: Floats) -> tuple[Posed, Telling]:
     """1 N = 100 kg cm/s²: lengths in cm, stresses in N/cm², densities in N s²/cm⁴."""
     length, stress, density = 1e2, 1e-4, 1e-8
@@ -243,7 +236,7 @@ def _in_n_and_cm(model: Model, spec: Spec, ground: Floats) -> tuple[Posed, Telli
     material = [Material(m.E * stress, m.nu, m.rho * density) for m in materials(spec)]
     joints = [JointMaterial(j.k_n * stress / length, j.k_s * stress / length, j.mu) for j in model.joint_materials(spec)]
     system = _rebuilt(model, spec, mesh, material, joints, thickness=length)
-    posed = _posed(model, spec, ground * length, system, _gravity(spec) * length, _pressure(model, spec) * stress)
+    posed = _posed(model, spec, ground * length, system, gravity_of(spec) * length, water_on(model.system.mesh, spec) * stress)
     return posed, _over(length, stress)
 
 
@@ -252,14 +245,14 @@ def _translated(model: Model, spec: Spec, ground: Floats) -> Posed:
     shift = [0.7 * spec.domain.width, -1.3 * spec.domain.depth]
     mesh = replace(model.system.mesh, nodes=model.system.mesh.nodes + shift, sections={})
     system = _rebuilt(model, spec, mesh, materials(spec), model.joint_materials(spec))
-    return _posed(model, spec, ground, system, _gravity(spec), _pressure(model, spec))
+    return _posed(model, spec, ground, system, gravity_of(spec), water_on(model.system.mesh, spec))
 
 
 def _thick(model: Model, spec: Spec, ground: Floats) -> Posed:
     """Twice as thick, and with it its weight and pressure."""
     mesh = model.system.mesh
     system = _rebuilt(model, spec, mesh, materials(spec), model.joint_materials(spec), thickness=2.0)
-    return _posed(model, spec, ground, system, _gravity(spec), _pressure(model, spec))
+    return _posed(model, spec, ground, system, gravity_of(spec), water_on(model.system.mesh, spec))
 
 
 def _layer_in_two(model: Model, spec: Spec, ground: Floats, rng: np.random.Generator) -> Posed:
@@ -275,7 +268,7 @@ def _layer_in_two(model: Model, spec: Spec, ground: Floats, rng: np.random.Gener
         joint_material=np.where(beside, mesh.joint_material + len(joints), mesh.joint_material),
     )
     system = _rebuilt(model, spec, again, [*materials(spec), *materials(spec)], [*joints, *joints])
-    return _posed(model, spec, ground, system, _gravity(spec), _pressure(model, spec))
+    return _posed(model, spec, ground, system, gravity_of(spec), water_on(model.system.mesh, spec))
 
 
 MIRRORED = ("A", "C", "B", "D", "S")  # of A, B, C, D, S

@@ -5,7 +5,7 @@ The formulas are those of the tests' slow engine and of numpy; what is linear in
 
 from collections import namedtuple
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg
@@ -17,11 +17,10 @@ from engine.model import materials
 from studies import Study
 from studies.schema import SCHEMA
 from tests import reference
-from tests.twin import Twin, twin_of_model
+from tests.twin import Twin, gravity_of, twin_of_model, water_on
 
 ROUNDING = 1e-12
 """Of the sum of the magnitudes of what is added up: some thousand terms, each known to a few units."""
-
 
 STATIC = 1e-8
 """Of the loads, left in the equilibrium before the shaking: a hundred times what the static stage leaves in a step."""
@@ -165,8 +164,7 @@ def _read_materials(reading: _Reading, model: Model, spec: Spec) -> None:
 def _read_static(reading: _Reading, model: Model, spec: Spec, twin: Twin, film: Film) -> None:
     """Before the shaking the joint forces keep within their law, and hold loads and elastic forces in balance."""
     whole, mesh = twin.whole, model.system.mesh
-    pressure = -mesh.nodes[:, 1] / spec.pressure.reference_height * spec.pressure.p0
-    load = reference.pressure_load(whole, mesh, pressure) - _gravity(spec) * whole.inertia[:, 1]
+    load = reference.pressure_load(whole, mesh, water_on(mesh, spec)) - gravity_of(spec) * whole.inertia[:, 1]
     normal, shear = film.force[0].T
     mu = model.system.joint_law(model.joint_materials(spec))[2]
     size = abs(film.force[0]).max(initial=0.0)
@@ -180,10 +178,6 @@ def _read_static(reading: _Reading, model: Model, spec: Spec, twin: Twin, film: 
     )
     if not np.linalg.norm(left) <= allowed:
         reading.wrong.append(f"static state: {np.linalg.norm(left):.1e} N of {np.linalg.norm(load):.1e} N are not balanced")
-
-
-def _gravity(spec: Spec) -> float:
-    return spec.gravity.acceleration if spec.gravity.self_weight else 0.0
 
 
 # ---- points and racking ----
@@ -391,10 +385,11 @@ def _section(
     elastic, mass = np.zeros((2, len(node_dofs), 2 * len(mesh.nodes)))
     place = np.full(2 * len(mesh.nodes), -1)
     place[node_dofs] = np.arange(len(node_dofs))
+    material = materials(spec)
     for nodes, index, solid in zip(mesh.triangles, mesh.material, mesh.structure, strict=True):
         if not (solid and on_cut[nodes].any() and is_behind(nodes[:3])):
             continue
-        of = materials(spec)[index]
+        of = material[index]
         k, m = reference.element(mesh.nodes[nodes], of.E, of.nu, of.rho)
         m = np.diag(m.sum(axis=1)) if system.lumped else m
         dofs = (2 * nodes[:, None] + [0, 1]).ravel()
@@ -402,16 +397,13 @@ def _section(
         elastic[np.ix_(place[dofs[own]], dofs)] += k[own]
         mass[np.ix_(place[dofs[own]], dofs)] += np.kron(m, np.eye(2))[own]
     alpha, beta = model.rayleigh.alpha, model.rayleigh.beta
-    base = np.tile(ground + np.array([0.0, _gravity(spec)]), len(mesh.nodes))  # weight is the force of a base that rises
+    base = np.tile(ground + np.array([0.0, gravity_of(spec)]), len(mesh.nodes))  # weight is the force of a base that rises
     parts = [_applied(elastic, film.u), _applied(beta * elastic, film.v), _applied(alpha * mass, film.v)]
     parts += [_applied(mass, film.a), _applied(mass, base)]
     parts.append(_joints_on(model, twin, film, node_dofs, [is_behind(joint[:2]) for joint in mesh.joints]))
-    water = np.zeros((len(mesh.nodes), 2))
-    depth = -mesh.nodes[:, 1] / spec.pressure.reference_height
-    for edge in mesh.pressure_edges:
-        if is_behind(edge[:2]):
-            water[edge] += _pushed(mesh.nodes[edge[:2]], depth[edge] * spec.pressure.p0)
-    pushed = np.repeat(water.ravel()[node_dofs][None], len(film.u), axis=0)
+    wet = replace(mesh, pressure_edges=mesh.pressure_edges[[is_behind(edge[:2]) for edge in mesh.pressure_edges]])
+    water = reference.pressure_load(twin.whole, wet, water_on(mesh, spec))[_columns(twin, node_dofs)]
+    pushed = np.repeat(water[None], len(film.u), axis=0)
     parts.append(Linear(-pushed, abs(pushed)))
     arm = mesh.nodes[section.nodes] - [section.x, section.y]
     inward = np.array([-section.along[1], section.along[0]])
@@ -427,18 +419,12 @@ def _joints_on(model: Model, twin: Twin, film: Film, node_dofs: np.ndarray, behi
     a_joint = len(whole.area) // len(behind)
     share = whole.area / points.area[twin.point] * np.repeat(behind, a_joint)
     force = ((film.force + film.damped)[:, twin.point] * share[:, None]).reshape(len(film.u), -1)
-    column = np.searchsorted(whole.owner, node_dofs)
-    return _applied(whole.B.toarray()[:, column].T, force)
+    return _applied(whole.B.toarray()[:, _columns(twin, node_dofs)].T, force)
 
 
-def _pushed(ends: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-    """Forces (n, 2) on the nodes of an edge under a linear pressure, which pushes to its left."""
-    along = ends[1] - ends[0]
-    first, last = pressure[:2]
-    shares = [(2 * first + last) / 6, (first + 2 * last) / 6]
-    if len(pressure) == 3:
-        shares = [first / 6, last / 6, (first + last) / 3]
-    return np.outer(shares, [-along[1], along[0]])
+def _columns(twin: Twin, dofs: np.ndarray) -> np.ndarray:
+    """The reference's number of degrees of freedom that are free, as the structure's are."""
+    return np.searchsorted(twin.whole.owner, dofs)
 
 
 # ---- cases that follow from others ----
@@ -455,7 +441,7 @@ def _followers_misread(study: Study, ds: xr.Dataset, case: int) -> Iterator[str]
         factor, loads = float(follower.scaled_by), []
         for each in (case, other):
             spec = study.cases[each]
-            loads.append([spec.pressure.p0, _gravity(spec), *study.ground(each).ravel()])
+            loads.append([spec.pressure.p0, gravity_of(spec), *study.ground(each).ravel()])
         if int(follower.solved_as) != case + 1 or not np.allclose(np.multiply(loads[0], factor), loads[1], rtol=1e-12, atol=0):
             yield f"case {other}: its loads are not those of case {case} times {factor:g}"
         for name in SCHEMA.keys() - {"solved_as", "scaled_by", "uplift_over_weight", "reason"}:
